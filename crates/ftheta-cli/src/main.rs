@@ -1,0 +1,2 @@
+//! The ftheta command: a drawing in, a marked field out.
+fn main() {}

@@ -1,0 +1,1 @@
+//! File syntax of ftheta: SVG drawings, machine and recipe files, plan files.

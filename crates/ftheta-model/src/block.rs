@@ -1,0 +1,35 @@
+//! A block: consecutive samples and the laser edges between them, and what takes blocks.
+
+use crate::space::DacCodes;
+
+/// Consecutive samples of a plan.
+#[derive(Clone, Debug, Default)]
+pub struct Block {
+    /// Index of the first sample in the plan; blocks follow on.
+    pub first_index: u64,
+    /// One word pair per tick.
+    pub words: Vec<DacCodes>,
+    /// Laser edges whose time lies within this block, in order.
+    pub edges: Vec<LaserEdge>,
+}
+
+/// A change of the laser's signal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LaserEdge {
+    /// Time of the signal from the plan's first sample, ns.
+    pub time_ns: u64,
+    /// Power from here on, W; zero is off.
+    pub power_w: f64,
+}
+
+/// Takes blocks in order: a device, or the twin.
+pub trait SampleSink {
+    /// What can go wrong.
+    type Error;
+
+    /// Takes the next block.
+    ///
+    /// # Errors
+    /// If the block does not follow on, or cannot be taken.
+    fn push(&mut self, block: &Block) -> Result<(), Self::Error>;
+}

@@ -1,0 +1,15 @@
+//! The nouns of ftheta: job, machine, toolpath, plan, block and trace, with their units.
+//!
+//! Data and invariants only: no file, clock, thread or random number is touched here. Lengths are
+//! mm, angles mechanical rad, times s or integer ns; public names carry the unit last.
+
+pub mod block;
+pub mod dose;
+pub mod job;
+pub mod machine;
+pub mod plan;
+pub mod recipe;
+pub mod space;
+pub mod toolpath;
+pub mod trace;
+pub mod warning;

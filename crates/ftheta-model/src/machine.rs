@@ -1,0 +1,199 @@
+//! A machine: scanner, optics, laser and output, as the user's machine file states them.
+
+/// Everything the planner knows of a machine; the twin may have other values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// Preset or file name.
+    pub name: String,
+    /// The motors, equal on both axes.
+    pub scanner: Scanner,
+    /// Mirrors and lens.
+    pub optics: Optics,
+    /// The source.
+    pub laser: Laser,
+    /// What is sent.
+    pub output: Output,
+}
+
+/// One galvanometer axis: limited-rotation motor, shaft, mirror, driver.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scanner {
+    /// Inertia of the rotor, kg·m².
+    pub rotor_inertia_kg_m2: f64,
+    /// Inertia of the mirror, kg·m².
+    pub mirror_inertia_kg_m2: f64,
+    /// Torque per current, N·m/A; equal to the back-EMF constant in V·s/rad.
+    pub torque_constant_n_m_a: f64,
+    /// Coil resistance, ohm.
+    pub resistance_ohm: f64,
+    /// Coil inductance, H.
+    pub inductance_h: f64,
+    /// First torsional mode of the free rotor and mirror, Hz.
+    pub torsional_mode_hz: f64,
+    /// Damping ratio of that mode.
+    pub damping_ratio: f64,
+    /// Greatest driver voltage, V, either sign.
+    pub voltage_max_v: f64,
+    /// Greatest driver current, A, either sign.
+    pub current_max_a: f64,
+    /// Current that the coil stands for ever, A rms.
+    pub current_rms_a: f64,
+    /// Thermal time constant of the coil, s.
+    pub thermal_time_s: f64,
+    /// Greatest mechanical angle, rad, either sign.
+    pub angle_max_rad: f64,
+    /// Greatest mechanical speed, rad/s.
+    pub speed_max_rad_s: f64,
+    /// Relative uncertainty of the torsional mode that plans must stand.
+    pub f1_uncertainty: f64,
+    /// Relative uncertainty of the torque constant that plans must stand.
+    pub kt_uncertainty: f64,
+    /// The position loop of the driver.
+    pub servo: Servo,
+    /// The position sensor.
+    pub sensor: Sensor,
+}
+
+/// The position loop inside the scanner's driver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Servo {
+    /// Linear-quadratic state feedback, tuned to a tracking lag.
+    StateFeedback {
+        /// Weight of the mirror's speed in the cost, s.
+        velocity_weight_s: f64,
+        /// Tracking lag on a ramp, s; the voltage weight is searched for it.
+        lag_s: f64,
+    },
+    /// PID on the sensor's angle with an inner current loop.
+    Pid {
+        /// Closed position loop's bandwidth, Hz.
+        bandwidth_hz: f64,
+        /// Damping ratio of the position loop.
+        damping: f64,
+        /// Integral time, s; infinite switches the integral off.
+        integral_time_s: f64,
+        /// Bandwidth of the inner current loop, Hz.
+        current_bandwidth_hz: f64,
+    },
+}
+
+/// Errors of the angle sensor on the rotor; all zero is a perfect sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sensor {
+    /// Relative gain error.
+    pub gain_error: f64,
+    /// Cubic error at the greatest angle, relative to that angle.
+    pub nonlinearity: f64,
+    /// Drift of the zero, rad/s.
+    pub drift_rad_s: f64,
+    /// Noise, rad rms per sample.
+    pub noise_rad: f64,
+}
+
+/// Mirrors and lens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Optics {
+    /// Lens, or focusing before the mirrors.
+    pub lens: Lens,
+    /// Which coordinate the first mirror in the beam moves.
+    pub first_mirror: Axis,
+    /// Side of the square field, mm.
+    pub field_mm: f64,
+}
+
+/// How the beam is focused.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lens {
+    /// F-theta lens: image height = f1·Θ + f2·Θ² + ..., Θ optical, rad.
+    FTheta {
+        /// f1 to at most f5, mm per radⁿ.
+        coefficients_mm: Vec<f64>,
+    },
+    /// Focused before the mirrors (dynamic focus), no lens behind them.
+    PostObjective {
+        /// Distance e of the two mirrors, mm.
+        mirror_distance_mm: f64,
+        /// Distance d of the second mirror to the work plane, mm.
+        working_distance_mm: f64,
+    },
+}
+
+/// A coordinate of the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// The x coordinate.
+    X,
+    /// The y coordinate.
+    Y,
+}
+
+/// The laser source.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Laser {
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Beam quality M², at least 1.
+    pub beam_quality_m2: f64,
+    /// 1/e² diameter of the collimated beam, mm.
+    pub beam_diameter_mm: f64,
+    /// 1/e² diameter of the spot in the work plane, mm.
+    pub spot_diameter_mm: f64,
+    /// Greatest power, W.
+    pub power_max_w: f64,
+    /// Light follows the on edge by this much, ns.
+    pub on_latency_ns: i64,
+    /// Light ends after the off edge by this much, ns.
+    pub off_latency_ns: i64,
+    /// Whether power can follow the speed of the beam.
+    pub power_modulated: bool,
+    /// Pulse rate, kHz; `None` is a continuous source.
+    pub pulse_khz: Option<f64>,
+}
+
+/// What the controller sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output {
+    /// Period of the samples, ns.
+    pub period_ns: u32,
+    /// Length of an output word, bits.
+    pub word_bits: u32,
+    /// Mechanical angle of the greatest word, rad.
+    pub word_range_rad: f64,
+    /// What a sample is.
+    pub drive: Drive,
+}
+
+/// What a sample is to the scanner's driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drive {
+    /// An angle word to a driver whose servo is known.
+    ServoKnown,
+    /// A voltage and a reference state.
+    Voltage,
+    /// An angle word to a driver of which only lag and limits are known.
+    BlackBox,
+}
+
+impl Scanner {
+    /// Inertia of rotor and mirror together, kg·m².
+    pub fn inertia_kg_m2(&self) -> f64 {
+        self.rotor_inertia_kg_m2 + self.mirror_inertia_kg_m2
+    }
+}
+
+impl Output {
+    /// Period of the samples, s.
+    pub fn period_s(&self) -> f64 {
+        f64::from(self.period_ns) * 1e-9
+    }
+
+    /// Greatest word, either sign.
+    pub fn word_max(&self) -> i32 {
+        (1 << (self.word_bits - 1)) - 1
+    }
+
+    /// Mechanical angle of one step of the word, rad.
+    pub fn word_step_rad(&self) -> f64 {
+        self.word_range_rad / f64::from(1u32 << (self.word_bits - 1))
+    }
+}

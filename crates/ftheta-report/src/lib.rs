@@ -1,0 +1,1 @@
+//! What the beam did against what was asked: figures, picture and report.

@@ -1,0 +1,1 @@
+//! A digital twin of a galvo machine: blocks in, the beam that they make out.

@@ -1,0 +1,1 @@
+//! Open software that moves laser beams with galvanometer mirrors.

@@ -1,0 +1,2 @@
+//! The project chores: ci, tidy, test, figures.
+fn main() {}
