@@ -1,1 +1,12 @@
 //! Pure mathematics of a galvo machine: motors, servo, optics, laser, and the audit of a plan.
+//!
+//! Functions of their arguments only. SI units and rad inside kernels; mm in the field.
+
+pub mod audit;
+pub mod axis_loop;
+pub mod galvo;
+pub mod laser;
+pub mod map_table;
+pub mod optics;
+pub mod plan;
+pub mod servo;

@@ -1,0 +1,308 @@
+//! The audit of a plan: every sample within the machine's limits, light only where a mark says so.
+//!
+//! Small, separate, and without the planner's code: it walks the segments by itself, takes every
+//! sample through the exact optics and the nominal servo and motor, and looks at what comes out.
+
+mod light;
+mod walk;
+
+use crate::axis_loop::AxisLoop;
+use crate::galvo::{CURRENT, Galvo};
+use crate::optics::angles_from_field;
+use crate::servo::{Gains, ServoError};
+use ftheta_model::plan::PlanDraft;
+use ftheta_model::space::FieldPoint;
+use thiserror::Error;
+use walk::Walk;
+
+/// This share of the angle and speed limits stays free for a correction table, which is applied
+/// after the audit.
+pub const CORRECTION_RESERVE: f64 = 0.03;
+
+/// Rounding that a ratio of 1 may carry.
+const ROUNDING: f64 = 1e-9;
+
+/// Peaks over a whole plan, each divided by the machine's limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Mirror angle.
+    pub angle: f64,
+    /// Mirror speed.
+    pub speed: f64,
+    /// Driver voltage.
+    pub voltage: f64,
+    /// Coil current.
+    pub current: f64,
+    /// Heat of the coil: filtered square of the current by the square of the rms limit.
+    pub heat: f64,
+    /// Samples past a limit.
+    pub violations: u64,
+}
+
+/// What the audit refuses.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum AuditError {
+    /// The plan's parts do not fit together.
+    #[error("plan is malformed at {place}: {what}")]
+    Malformed {
+        /// Segment, mark or vertex.
+        place: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The optics cannot reach a place.
+    #[error("{place}: the optics cannot reach ({x_mm:.3}, {y_mm:.3}) mm")]
+    Unreachable {
+        /// Sample and mark.
+        place: String,
+        /// Place, mm.
+        x_mm: f64,
+        /// Place, mm.
+        y_mm: f64,
+    },
+    /// A limit of the motors is passed.
+    #[error("{place}: {quantity} {value:.4} {unit} exceeds the limit {limit:.4} {unit}")]
+    Limit {
+        /// Sample and mark.
+        place: String,
+        /// Which quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its limit.
+        limit: f64,
+        /// Unit of both.
+        unit: &'static str,
+    },
+    /// Light where no mark is.
+    #[error(
+        "{place}: laser {edge} edge lies {value_us:.1} µs away from its mark, limit {limit_us:.1} µs"
+    )]
+    Light {
+        /// Mark.
+        place: String,
+        /// `on` or `off`.
+        edge: &'static str,
+        /// Distance in time, µs.
+        value_us: f64,
+        /// Greatest distance, µs.
+        limit_us: f64,
+    },
+    /// Power out of range.
+    #[error("{place}: power {value_w} W is outside 0 to {limit_w} W")]
+    Power {
+        /// Mark.
+        place: String,
+        /// Power, W.
+        value_w: f64,
+        /// Greatest power of the laser, W.
+        limit_w: f64,
+    },
+    /// The nominal servo cannot be built.
+    #[error(transparent)]
+    Servo(#[from] ServoError),
+}
+
+impl AuditError {
+    /// Place, value and limit for a machine-readable message.
+    pub fn fault(&self) -> (String, String, String) {
+        match self {
+            Self::Malformed { place, what } => (place.clone(), what.clone(), String::new()),
+            Self::Unreachable { place, x_mm, y_mm } => (
+                place.clone(),
+                format!("({x_mm:.3}, {y_mm:.3}) mm"),
+                "optics".into(),
+            ),
+            Self::Limit {
+                place,
+                value,
+                limit,
+                unit,
+                ..
+            } => (
+                place.clone(),
+                format!("{value} {unit}"),
+                format!("{limit} {unit}"),
+            ),
+            Self::Light {
+                place,
+                value_us,
+                limit_us,
+                ..
+            } => (
+                place.clone(),
+                format!("{value_us} µs"),
+                format!("{limit_us} µs"),
+            ),
+            Self::Power {
+                place,
+                value_w,
+                limit_w,
+            } => (
+                place.clone(),
+                format!("{value_w} W"),
+                format!("{limit_w} W"),
+            ),
+            Self::Servo(error) => ("scanner.servo".into(), error.to_string(), String::new()),
+        }
+    }
+}
+
+/// Peaks of a plan on the nominal machine.
+///
+/// # Errors
+/// The first thing that the machine does not allow. Angle and speed may use 97 % of their limits
+/// (see [`CORRECTION_RESERVE`]).
+pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
+    walk::check_structure(draft)?;
+    light::check_light(draft)?;
+    let mut walk = Walk::new(draft);
+    let mut meter = Meter::new(draft)?;
+    while let Some((place, segment_index)) = walk.next() {
+        meter.sample(draft, place, segment_index)?;
+    }
+    Ok(meter.limits)
+}
+
+/// Drives the nominal axes and keeps the peaks.
+struct Meter {
+    axes: [AxisLoop; 2],
+    heat_a2: [f64; 2],
+    heat_decay: f64,
+    angle_row: crate::galvo::State,
+    speed_row: crate::galvo::State,
+    n_samples: u64,
+    limits: Limits,
+}
+
+impl Meter {
+    fn new(draft: &PlanDraft) -> Result<Self, ServoError> {
+        let scanner = &draft.machine.scanner;
+        let tick_s = draft.machine.output.period_s();
+        let plant = Galvo::new(scanner);
+        let axis = AxisLoop::new(&plant, Gains::design(scanner, tick_s)?, scanner, tick_s);
+        Ok(Self {
+            axes: [axis.clone(), axis],
+            heat_a2: [0.0; 2],
+            heat_decay: (-tick_s / scanner.thermal_time_s).exp(),
+            angle_row: plant.mirror_row(),
+            speed_row: plant.mirror_speed_row(),
+            n_samples: 0,
+            limits: Limits::default(),
+        })
+    }
+
+    fn sample(
+        &mut self,
+        draft: &PlanDraft,
+        place: FieldPoint,
+        segment_index: usize,
+    ) -> Result<(), AuditError> {
+        let where_ = || describe(draft, segment_index, self.n_samples);
+        let angles = angles_from_field(&draft.machine.optics, place).ok_or_else(|| {
+            AuditError::Unreachable {
+                place: where_(),
+                x_mm: place.x_mm,
+                y_mm: place.y_mm,
+            }
+        })?;
+        let scanner = &draft.machine.scanner;
+        let mut now = Limits::default();
+        for (axis, command) in [angles.x_rad, angles.y_rad].into_iter().enumerate() {
+            let voltage_v = self.axes[axis].tick(command, 0.0);
+            let state = self.axes[axis].state();
+            let current_a = state[CURRENT];
+            let heat = &mut self.heat_a2[axis];
+            *heat = current_a * current_a + (*heat - current_a * current_a) * self.heat_decay;
+            let angle_rad = command.abs().max(self.angle_row.dot(state).abs());
+            now.angle = now.angle.max(angle_rad / scanner.angle_max_rad);
+            let speed_rad_s = self.speed_row.dot(state).abs();
+            now.speed = now.speed.max(speed_rad_s / scanner.speed_max_rad_s);
+            now.voltage = now.voltage.max(voltage_v.abs() / scanner.voltage_max_v);
+            now.current = now.current.max(current_a.abs() / scanner.current_max_a);
+            now.heat = now
+                .heat
+                .max(*heat / (scanner.current_rms_a * scanner.current_rms_a));
+        }
+        refuse(draft, &now, where_)?;
+        self.n_samples += 1;
+        self.limits.keep_peaks(&now);
+        Ok(())
+    }
+}
+
+impl Limits {
+    fn keep_peaks(&mut self, now: &Self) {
+        self.angle = self.angle.max(now.angle);
+        self.speed = self.speed.max(now.speed);
+        self.voltage = self.voltage.max(now.voltage);
+        self.current = self.current.max(now.current);
+        self.heat = self.heat.max(now.heat);
+        let worst = [now.angle, now.speed, now.voltage, now.current, now.heat];
+        self.violations += u64::from(worst.iter().any(|&ratio| ratio > 1.0 + ROUNDING));
+    }
+}
+
+/// The error for the first quantity of a sample that is past its limit.
+fn refuse(draft: &PlanDraft, now: &Limits, place: impl Fn() -> String) -> Result<(), AuditError> {
+    let scanner = &draft.machine.scanner;
+    let free = 1.0 - CORRECTION_RESERVE;
+    let rows = [
+        (
+            now.angle,
+            free,
+            "mirror angle",
+            scanner.angle_max_rad.to_degrees(),
+            "deg",
+        ),
+        (
+            now.speed,
+            free,
+            "mirror speed",
+            scanner.speed_max_rad_s,
+            "rad/s",
+        ),
+        (
+            now.voltage,
+            1.0,
+            "driver voltage",
+            scanner.voltage_max_v,
+            "V",
+        ),
+        (now.current, 1.0, "coil current", scanner.current_max_a, "A"),
+        (
+            now.heat,
+            1.0,
+            "coil heat",
+            scanner.current_rms_a * scanner.current_rms_a,
+            "A²",
+        ),
+    ];
+    for (ratio, share, quantity, limit, unit) in rows {
+        // The negated form also catches NaN.
+        if !(ratio <= share + ROUNDING) {
+            let (value, limit) = (ratio * limit, share * limit);
+            return Err(AuditError::Limit {
+                place: place(),
+                quantity,
+                value,
+                limit,
+                unit,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Sample and mark, for messages.
+fn describe(draft: &PlanDraft, segment_index: usize, sample: u64) -> String {
+    let time_ms = sample as f64 * draft.machine.output.period_s() * 1e3;
+    match draft.segments[segment_index].mark_index {
+        Some(index) => {
+            let source = &draft.marks[index as usize].source;
+            format!("mark {index} ({source}), sample {sample} at {time_ms:.3} ms")
+        }
+        None => format!("jump, sample {sample} at {time_ms:.3} ms"),
+    }
+}

@@ -1,0 +1,163 @@
+//! Walks a plan's segments sample by sample, from their definition alone.
+
+use super::AuditError;
+use ftheta_model::plan::{Motion, PlanDraft};
+use ftheta_model::space::FieldPoint;
+use kurbo::Point;
+
+/// Yields the commanded place of every sample, and the segment it belongs to.
+pub struct Walk<'a> {
+    draft: &'a PlanDraft,
+    segment_index: usize,
+    /// Samples of the segment already given.
+    n_given: u32,
+    /// Vertex before the place last given, and the path length up to it.
+    leg: usize,
+    leg_start_mm: f64,
+}
+
+impl<'a> Walk<'a> {
+    /// Starts at the first sample.
+    pub fn new(draft: &'a PlanDraft) -> Self {
+        let mut walk = Self {
+            draft,
+            segment_index: 0,
+            n_given: 0,
+            leg: 0,
+            leg_start_mm: 0.0,
+        };
+        walk.enter();
+        walk
+    }
+
+    /// The next sample, or `None` after the last.
+    pub fn next(&mut self) -> Option<(FieldPoint, usize)> {
+        let segment = self.draft.segments.get(self.segment_index)?;
+        let index = self.segment_index;
+        self.n_given += 1;
+        let place = self.place(&segment.motion, self.n_given == segment.n_ticks);
+        if self.n_given == segment.n_ticks {
+            self.segment_index += 1;
+            self.n_given = 0;
+            self.enter();
+        }
+        Some((place.into(), index))
+    }
+
+    fn enter(&mut self) {
+        self.leg_start_mm = 0.0;
+        if let Some(segment) = self.draft.segments.get(self.segment_index) {
+            self.leg = first_vertex(&segment.motion);
+        }
+    }
+
+    fn place(&mut self, motion: &Motion, last: bool) -> Point {
+        let vertices = &self.draft.vertices;
+        let &Motion::Travel {
+            first_vertex,
+            n_vertices,
+            profile,
+            ..
+        } = motion
+        else {
+            return vertices[self.leg];
+        };
+        let end = (first_vertex + n_vertices) as usize - 1;
+        if last {
+            return vertices[end];
+        }
+        let time_s = f64::from(self.n_given) * self.draft.machine.output.period_s();
+        let distance_mm = profile.distance_mm(time_s);
+        loop {
+            let (from, to) = (vertices[self.leg], vertices[self.leg + 1]);
+            let length_mm = from.distance(to);
+            let along_mm = distance_mm - self.leg_start_mm;
+            if along_mm <= length_mm || self.leg + 1 == end {
+                return from.lerp(to, (along_mm / length_mm).min(1.0));
+            }
+            self.leg_start_mm += length_mm;
+            self.leg += 1;
+        }
+    }
+}
+
+fn first_vertex(motion: &Motion) -> usize {
+    match *motion {
+        Motion::Hold { vertex } => vertex as usize,
+        Motion::Travel { first_vertex, .. } => first_vertex as usize,
+    }
+}
+
+fn last_vertex(motion: &Motion) -> usize {
+    match *motion {
+        Motion::Hold { vertex } => vertex as usize,
+        Motion::Travel {
+            first_vertex,
+            n_vertices,
+            ..
+        } => first_vertex as usize + n_vertices as usize - 1,
+    }
+}
+
+/// Checks that indices exist, numbers are finite and segments join end to end from the centre.
+pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
+    let malformed = |place: String, what: &str| AuditError::Malformed {
+        place,
+        what: what.into(),
+    };
+    if draft.segments.is_empty() {
+        return Err(malformed("the plan".into(), "no segments"));
+    }
+    if let Some(index) = draft.vertices.iter().position(|vertex| !vertex.is_finite()) {
+        return Err(malformed(
+            format!("vertex {index}"),
+            "a coordinate is not finite",
+        ));
+    }
+    if let Some(index) = draft
+        .marks
+        .iter()
+        .position(|mark| mark.pen_index >= draft.pens.len())
+    {
+        return Err(malformed(format!("mark {index}"), "its pen does not exist"));
+    }
+    let mut at = Point::ZERO;
+    for (index, segment) in draft.segments.iter().enumerate() {
+        let place = || format!("segment {index}");
+        if segment.n_ticks == 0 {
+            return Err(malformed(place(), "no samples"));
+        }
+        if segment
+            .mark_index
+            .is_some_and(|mark| mark as usize >= draft.marks.len())
+        {
+            return Err(malformed(place(), "its mark does not exist"));
+        }
+        if let Motion::Travel {
+            n_vertices,
+            profile,
+            ..
+        } = segment.motion
+        {
+            let positive = |value: f64| value > 0.0;
+            if n_vertices < 2
+                || !(profile.length_mm.is_finite() && profile.speed_mm_s.is_finite())
+                || !(positive(profile.length_mm) && positive(profile.speed_mm_s))
+                || !(positive(profile.acceleration_mm_s2) && positive(profile.deceleration_mm_s2))
+            {
+                return Err(malformed(place(), "its speed profile is impossible"));
+            }
+        }
+        if last_vertex(&segment.motion) >= draft.vertices.len() {
+            return Err(malformed(place(), "its vertices do not exist"));
+        }
+        if draft.vertices[first_vertex(&segment.motion)] != at {
+            return Err(malformed(
+                place(),
+                "it does not start where the one before ends",
+            ));
+        }
+        at = draft.vertices[last_vertex(&segment.motion)];
+    }
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! One axis under its servo: reference angle in, state of mirror and coil out, tick by tick.
+
+use crate::galvo::{CURRENT, Galvo, State, Step};
+use crate::servo::{Gains, Memory, Seen};
+use ftheta_model::machine::Scanner;
+use nalgebra::DMatrix;
+
+/// An axis with its servo and driver, advanced by one reference angle per tick.
+#[derive(Clone, Debug)]
+pub struct AxisLoop {
+    gains: Gains,
+    step: Step,
+    rotor_row: State,
+    /// Weights of the states in the current one tick later.
+    current_row: State,
+    tick_s: f64,
+    voltage_max_v: f64,
+    current_max_a: f64,
+    memory: Memory,
+    state: State,
+    /// Voltage acting during the tick that comes next.
+    pending_v: f64,
+}
+
+impl AxisLoop {
+    /// An axis at rest in its centre.
+    ///
+    /// * `plant`: the axis as it is; `gains` were designed for the nominal one
+    pub fn new(plant: &Galvo, gains: Gains, scanner: &Scanner, tick_s: f64) -> Self {
+        let step = plant.step(tick_s);
+        Self {
+            gains,
+            step,
+            rotor_row: plant.rotor_row(),
+            current_row: step.a.row(CURRENT).transpose(),
+            tick_s,
+            voltage_max_v: scanner.voltage_max_v,
+            current_max_a: scanner.current_max_a,
+            memory: Memory::default(),
+            state: State::zeros(),
+            pending_v: 0.0,
+        }
+    }
+
+    /// The states now: at the beginning of the next tick.
+    #[inline]
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// True angle of the rotor, rad.
+    #[inline]
+    pub fn rotor_rad(&self) -> f64 {
+        self.rotor_row.dot(&self.state)
+    }
+
+    /// Takes the reference of this tick and moves on to the next; returns the voltage that acted
+    /// meanwhile, V.
+    ///
+    /// The servo reads state and reference now; what it computes acts one tick later.
+    #[inline]
+    pub fn tick(&mut self, reference_rad: f64, sensor_error_rad: f64) -> f64 {
+        let acting_v = self.limited(self.pending_v);
+        let seen = Seen {
+            state: self.state,
+            sensor_rad: self.rotor_rad() + sensor_error_rad,
+            sensor_error_rad,
+            voltage_v: acting_v,
+        };
+        self.pending_v = self
+            .gains
+            .voltage(&mut self.memory, reference_rad, &seen, self.tick_s);
+        self.state = self.step.a * self.state + self.step.b * acting_v;
+        acting_v
+    }
+
+    /// What the driver makes of a voltage: within the supply, and not so much that the current
+    /// leaves its limit by the end of the tick.
+    #[inline]
+    fn limited(&self, voltage_v: f64) -> f64 {
+        let voltage_v = voltage_v.clamp(-self.voltage_max_v, self.voltage_max_v);
+        let free = self.current_row.dot(&self.state);
+        let per_volt = self.step.b[CURRENT];
+        let (low, high) = (
+            (-self.current_max_a - free) / per_volt,
+            (self.current_max_a - free) / per_volt,
+        );
+        voltage_v
+            .clamp(low, high)
+            .clamp(-self.voltage_max_v, self.voltage_max_v)
+    }
+}
+
+/// Greatest factor by which a state of the closed loop grows per tick, without limits.
+///
+/// The loop is linear, so its matrix is found by playing each unit state for one tick.
+pub fn spectral_radius(plant: &Galvo, gains: &Gains, tick_s: f64) -> f64 {
+    let step = plant.step(tick_s);
+    // Axis, voltage under way, and what the servo remembers.
+    let n_states = 6 + gains.n_memories();
+    let mut matrix = DMatrix::zeros(n_states, n_states);
+    for column in 0..n_states {
+        let mut z = [0.0; 9];
+        z[column] = 1.0;
+        let state = State::from_column_slice(&z[..5]);
+        let mut memory = Memory::from_array([z[6], z[7], z[8]]);
+        let seen = Seen {
+            state,
+            sensor_rad: plant.rotor_row().dot(&state),
+            sensor_error_rad: 0.0,
+            voltage_v: z[5],
+        };
+        let voltage = gains.voltage(&mut memory, 0.0, &seen, tick_s);
+        let next = step.a * state + step.b * z[5];
+        let after = memory.to_array();
+        for row in 0..n_states {
+            matrix[(row, column)] = match row {
+                0..5 => next[row],
+                5 => voltage,
+                _ => after[row - 6],
+            };
+        }
+    }
+    matrix
+        .complex_eigenvalues()
+        .iter()
+        .map(|value| value.norm())
+        .fold(0.0, f64::max)
+}
