@@ -136,9 +136,9 @@ fn response_at_circle_frequencies_is_the_prototypes() {
         (0.5, 2000.0, 0.962_962_272_6, -37.388_115_6),
     ] {
         let found = response(&scanner, speed_mm_s / (TAU * radius_mm));
-        // The lags of the table are rounded to 4 digits, which moves the gains by 2e-5.
+        // Lag and weights of the table are rounded to 4 digits: 2e-5 of gain, 0.02 deg of phase.
         assert!((found.0 - gain).abs() < 5e-5, "gain {}", found.0);
-        assert!((found.1 - phase_deg).abs() < 2e-3, "phase {}", found.1);
+        assert!((found.1 - phase_deg).abs() < 0.03, "phase {}", found.1);
     }
 }
 
