@@ -1,2 +1,36 @@
 //! The ftheta command: a drawing in, a marked field out.
-fn main() {}
+
+mod arguments;
+mod command;
+mod json;
+mod progress;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let json = arguments.json;
+    let result = match arguments.command {
+        Command::Mark(mark) => command::mark::run(&mark, json),
+        Command::Verify(verify) => command::verify::run(&verify, json),
+        Command::Machine(machine) => command::machine::run(&machine, json),
+        Command::Completions { shell } => {
+            command::completions(shell);
+            Ok(())
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let fault = error.fault();
+            if json {
+                json::print(&json::fault(&fault));
+            } else {
+                eprintln!("error: {}", fault.message);
+            }
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,1 +1,8 @@
 //! File syntax of ftheta: SVG drawings, machine and recipe files, plan files.
+
+pub mod machine;
+pub mod plan_file;
+pub mod recipe;
+pub mod svg;
+pub mod text;
+pub mod toml_table;

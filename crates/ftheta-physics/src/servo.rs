@@ -107,13 +107,11 @@ impl Gains {
         }
     }
 
-    /// Lag behind a ramp in the steady state, s. Only exact in the absence of limits; zero for a
-    /// PID servo with an integral.
+    /// Lag behind a ramp, s: in the steady state, and for a PID servo before its integral acts.
     pub fn lag_s(&self, galvo: &Galvo) -> f64 {
         match self {
             // At constant speed v: I = 0, q = 0, u = Kt·v = k0·(v·lag) - k1·v - k5·Kt·v.
             Self::StateFeedback { k0, k, .. } => (galvo.torque_constant * (1.0 + k[5]) + k[1]) / k0,
-            Self::Pid(gains) if gains.integral > 0.0 => 0.0,
             Self::Pid(gains) => gains.derivative / gains.proportional,
         }
     }

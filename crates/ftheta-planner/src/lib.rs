@@ -1,1 +1,9 @@
 //! From vectors to mirror motion and laser edges on one tick grid, and to the words sent.
+//!
+//! Deterministic: the same toolpath and machine give the same plan, bit for bit.
+
+pub mod classic;
+mod error;
+pub mod render;
+
+pub use error::PlanError;

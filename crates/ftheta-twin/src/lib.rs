@@ -1,1 +1,9 @@
 //! A digital twin of a galvo machine: blocks in, the beam that they make out.
+//!
+//! It sees only what a device would see, and has parameters of its own.
+
+mod beam;
+mod exposure;
+mod light;
+pub mod mismatch;
+pub mod twin;

@@ -1,1 +1,20 @@
 //! Open software that moves laser beams with galvanometer mirrors.
+//!
+//! A drawing in, a marked field out: [`import::drawing`] reads a file as a job, [`mark::mark`]
+//! lays, plans, audits and plays it on the digital twin, [`output::write`] writes what came of it.
+
+pub mod error;
+pub mod import;
+pub mod machines;
+pub mod mark;
+pub mod output;
+pub mod verify;
+
+pub use error::{Error, Fault};
+pub use ftheta_formats as formats;
+pub use ftheta_model as model;
+pub use ftheta_physics as physics;
+pub use ftheta_planner as planner;
+pub use ftheta_report as report;
+pub use ftheta_toolpath as toolpath;
+pub use ftheta_twin as twin;

@@ -1,0 +1,237 @@
+//! The command line: one struct per command, help texts with an example each.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+use ftheta::toolpath::lay::Order;
+use ftheta::twin::mismatch::Mismatch;
+use std::path::PathBuf;
+
+/// Open software that moves laser beams with galvanometer mirrors.
+#[derive(Parser)]
+#[command(name = "ftheta", version, arg_required_else_help = true)]
+#[command(after_help = "Example: ftheta mark panel.svg --machine S10 --out panel")]
+pub struct Arguments {
+    /// Print one JSON object on stdout and nothing else.
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Plan a drawing, mark it on the digital twin, and report what it did.
+    Mark(Box<Mark>),
+    /// Audit a plan file again: its id, its limits, its light.
+    Verify(Verify),
+    /// List, show and check machines.
+    Machine(Machine),
+    /// Print the completion script for a shell.
+    #[command(after_help = "Example: ftheta completions bash > ~/.bash_completion.d/ftheta")]
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+}
+
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  ftheta mark panel.svg
+  ftheta mark logo.svg --machine S14-f255 --fit 80 --speed 2000 --out logo
+  ftheta mark text.svg --machine my-machine.toml --recipe steel.toml --mismatch f1=+0.03
+
+A file NAME.recipe.toml beside NAME.svg is used unless --recipe names another.")]
+pub struct Mark {
+    /// Drawing: .svg or .svgz.
+    pub input: PathBuf,
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Recipe file: pens, delays, text style.
+    #[arg(long, value_name = "FILE")]
+    pub recipe: Option<PathBuf>,
+    /// Speed of all pens, mm/s, instead of the recipe's.
+    #[arg(long, value_name = "MM_S", value_parser = positive)]
+    pub speed: Option<f64>,
+    /// How the motion is planned.
+    #[arg(long, value_enum, default_value = "classic")]
+    pub planner: PlannerName,
+    /// Greatest distance of the beam from a mark, µm.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
+    pub tolerance_um: f64,
+    /// Order of the marks: short jumps, or as drawn.
+    #[arg(long, value_enum, default_value = "shortest")]
+    pub order: OrderName,
+    /// Scale the page so that its longest side is this long, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub fit: Option<f64>,
+    /// Mark what fits of shapes that leave the field.
+    #[arg(long)]
+    pub clip: bool,
+    /// Look for the drawing's fonts on this computer instead of using the bundled one.
+    #[arg(long)]
+    pub system_fonts: bool,
+    /// Seed of the twin's noise.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub seed: u64,
+    /// Errors of the twin's plant that the planner does not know of: f1, kt relative, zeta
+    /// absolute, as in f1=+0.03,kt=-0.02,zeta=0.0025.
+    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
+          value_parser = mismatch, allow_hyphen_values = true)]
+    pub mismatch: Mismatch,
+    /// Noise of the twin's position sensors, µm rms in the field.
+    #[arg(long, value_name = "S", default_value = "0", value_parser = not_negative)]
+    pub noise_um: f64,
+    /// Folder for report.html, mark.png and plan.ftheta; out/NAME if not given.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(after_help = "Example: ftheta verify out/panel/plan.ftheta")]
+pub struct Verify {
+    /// Plan file, as `ftheta mark` writes it.
+    pub plan: PathBuf,
+}
+
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  ftheta machine list
+  ftheta machine show S14-f255 > my-machine.toml
+  ftheta machine check my-machine.toml")]
+pub struct Machine {
+    #[command(subcommand)]
+    pub action: MachineAction,
+}
+
+#[derive(Subcommand)]
+pub enum MachineAction {
+    /// List the presets.
+    List,
+    /// Print a machine file, to start one's own from.
+    Show {
+        /// Preset or machine file.
+        machine: String,
+    },
+    /// Check a machine file and print what follows from it.
+    Check {
+        /// Preset or machine file.
+        machine: String,
+    },
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum PlannerName {
+    /// What RTC- and EZCAD-type controllers do: constant speed and delays.
+    Classic,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum OrderName {
+    /// Short jumps; marks may be reversed, inner contours come first.
+    Shortest,
+    /// The drawing's own order and directions.
+    Keep,
+}
+
+impl From<OrderName> for Order {
+    fn from(name: OrderName) -> Self {
+        match name {
+            OrderName::Shortest => Self::Shortest,
+            OrderName::Keep => Self::Keep,
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| {
+        if value > 0.0 {
+            Ok(value)
+        } else {
+            Err(format!("{value} is not greater than 0"))
+        }
+    })
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| {
+        if value >= 0.0 {
+            Ok(value)
+        } else {
+            Err(format!("{value} is less than 0"))
+        }
+    })
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let value: f64 = text
+        .trim()
+        .parse()
+        .map_err(|_| format!("\"{text}\" is not a number"))?;
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not finite"))
+    }
+}
+
+/// Reads `f1=+0.03,kt=-0.02,zeta=0.0025`.
+fn mismatch(text: &str) -> Result<Mismatch, String> {
+    let mut mismatch = Mismatch::default();
+    for part in text.split(',').filter(|part| !part.trim().is_empty()) {
+        let (key, value) = part
+            .split_once('=')
+            .ok_or_else(|| format!("\"{part}\" is not of the form key=value"))?;
+        let value = number(value)?;
+        let (slot_range, key) = match key.trim() {
+            key @ ("f1" | "kt") => (-0.5..=0.5, key),
+            key @ "zeta" => (1e-5..=0.5, key),
+            other => return Err(format!("unknown key \"{other}\", known are f1, kt, zeta")),
+        };
+        if !slot_range.contains(&value) {
+            let (low, high) = slot_range.into_inner();
+            return Err(format!("{key} = {value} is outside {low} to {high}"));
+        }
+        match key {
+            "f1" => mismatch.f1 = value,
+            "kt" => mismatch.kt = value,
+            _ => mismatch.zeta = Some(value),
+        }
+    }
+    Ok(mismatch)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn mismatch_is_read_or_refused() {
+        let read = mismatch("f1=+0.03, kt=-0.02,zeta=0.0025").unwrap();
+        assert_eq!(
+            read,
+            Mismatch {
+                f1: 0.03,
+                kt: -0.02,
+                zeta: Some(0.0025)
+            }
+        );
+        assert_eq!(mismatch("").unwrap(), Mismatch::default());
+        for (text, expected) in [
+            ("f1", "\"f1\" is not of the form key=value"),
+            ("f2=1", "unknown key \"f2\", known are f1, kt, zeta"),
+            ("f1=nan", "NaN is not finite"),
+            ("kt=0.6", "kt = 0.6 is outside -0.5 to 0.5"),
+        ] {
+            assert_eq!(mismatch(text).unwrap_err(), expected);
+        }
+    }
+}

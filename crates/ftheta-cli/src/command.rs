@@ -1,0 +1,19 @@
+//! The commands: each reads its arguments, calls the library, prints.
+
+pub mod machine;
+pub mod mark;
+pub mod verify;
+
+use crate::arguments::Arguments;
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+/// Prints the completion script of a shell.
+pub fn completions(shell: Shell) {
+    clap_complete::generate(
+        shell,
+        &mut Arguments::command(),
+        "ftheta",
+        &mut std::io::stdout(),
+    );
+}

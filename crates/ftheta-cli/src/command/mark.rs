@@ -1,0 +1,134 @@
+//! `ftheta mark`: the main job.
+
+use crate::arguments::Mark;
+use crate::json;
+use crate::progress::Progress;
+use ftheta::formats::svg::SvgOptions;
+use ftheta::mark::{MarkOptions, Marked, mark};
+use ftheta::model::warning::Warning;
+use ftheta::output::Output;
+use ftheta::physics::audit::Limits;
+use ftheta::{Error, import, machines};
+use std::path::PathBuf;
+
+/// Plans, plays, reports.
+pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
+    let mut progress = Progress::new("import");
+    let machine = machines::find(&arguments.machine)?;
+    let (recipe, recipe_path) = import::recipe_for(&arguments.input, arguments.recipe.as_deref())?;
+    if let Some(path) = &recipe_path {
+        note(as_json, &format!("recipe {}", path.display()));
+    }
+    let svg_options = SvgOptions {
+        system_fonts: arguments.system_fonts,
+        fit_mm: arguments.fit,
+        ..SvgOptions::default()
+    };
+    let drawing = import::drawing(&arguments.input, &recipe, &svg_options)?;
+    let mut output = Output::new(&folder(arguments))?;
+    let options = MarkOptions {
+        speed_mm_s: arguments.speed,
+        tolerance_mm: arguments.tolerance_um * 1e-3,
+        order: arguments.order.into(),
+        clip: arguments.clip,
+        mismatch: arguments.mismatch,
+        noise_mm: arguments.noise_um * 1e-3,
+        seed: arguments.seed,
+    };
+    let marked = mark(&drawing.value, &machine, &recipe, &options, &mut |stage| {
+        progress.observe(stage);
+    })?;
+    progress.enter("write");
+    let warnings: Vec<Warning> = drawing
+        .warnings
+        .iter()
+        .chain(&marked.warnings)
+        .cloned()
+        .collect();
+    let files = ftheta::output::write_all(&mut output, &title(arguments), &marked, &warnings)?;
+    output.publish()?;
+    let stages = progress.finish();
+    if as_json {
+        json::print(&json::marked(&marked, &warnings, &stages, &files));
+    } else {
+        print(&marked, &warnings, &stages, &files);
+    }
+    Ok(())
+}
+
+/// A message beside the result: stderr, so that stdout stays one object.
+fn note(as_json: bool, message: &str) {
+    if as_json {
+        eprintln!("{message}");
+    } else {
+        println!("{message}");
+    }
+}
+
+fn title(arguments: &Mark) -> String {
+    let stem = arguments.input.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
+fn folder(arguments: &Mark) -> PathBuf {
+    arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("out").join(title(arguments)))
+}
+
+fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &[(&str, String)]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+    let (times, score) = (&marked.times, &marked.score);
+    println!(
+        "plan     {} on {}: {} marks of {:.1} mm, {} jumps",
+        marked.plan.id(),
+        marked.plan.machine.name,
+        marked.plan.marks.len(),
+        times.marked_mm,
+        times.n_jumps
+    );
+    println!(
+        "time     {:.3} s: {:.3} s marking, {:.3} s dark, of which {:.3} s waiting",
+        times.duration_s, times.mark_s, times.jump_s, times.delay_s
+    );
+    print_limits(marked.plan.limits());
+    println!(
+        "twin     contour error {:.1} µm max, {:.1} µm p99; ends {:.1} µm max; coverage {:.1} µm max",
+        score.contour_error_um.max,
+        score.contour_error_um.p99,
+        score.end_error_um.max,
+        score.coverage_error_um.max
+    );
+    if let Some(dose) = score.dose_ratio {
+        println!(
+            "dose     {:.3} to {:.3} (p1 to p99), {:.3} max; stray energy {:.2} %",
+            dose.p01,
+            dose.p99,
+            dose.max,
+            score.stray_energy_ratio * 100.0
+        );
+    }
+    for (kind, path) in files {
+        println!("{kind:8} {path}");
+    }
+    let stages: Vec<String> = stages
+        .iter()
+        .map(|(name, time_s)| format!("{name} {time_s:.2} s"))
+        .collect();
+    println!("took     {}", stages.join(", "));
+}
+
+/// One line of peaks.
+pub fn print_limits(limits: &Limits) {
+    println!(
+        "limits   angle {:.0} %, speed {:.1} %, voltage {:.0} %, current {:.0} %, heat {:.1} %",
+        limits.angle * 100.0,
+        limits.speed * 100.0,
+        limits.voltage * 100.0,
+        limits.current * 100.0,
+        limits.heat * 100.0
+    );
+}

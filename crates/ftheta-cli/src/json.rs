@@ -1,0 +1,111 @@
+//! The JSON of the command line contract.
+
+use ftheta::Fault;
+use ftheta::mark::{Marked, PlanTimes};
+use ftheta::model::plan::Planner;
+use ftheta::model::warning::Warning;
+use ftheta::physics::audit::Limits;
+use ftheta::physics::plan::Plan;
+use ftheta::report::score::Score;
+use serde_json::{Value, json};
+
+/// Prints the one object of a command.
+pub fn print(value: &Value) {
+    println!("{value}");
+}
+
+/// An error as an object.
+pub fn fault(fault: &Fault) -> Value {
+    json!({"error": {
+        "message": fault.message,
+        "where": fault.place,
+        "value": fault.value,
+        "limit": fault.limit,
+    }})
+}
+
+/// A marked job as an object.
+///
+/// * `stages`: wall time of each stage, s
+/// * `files`: what was written: kind and path
+pub fn marked(
+    marked: &Marked,
+    warnings: &[Warning],
+    stages: &[(&str, f64)],
+    files: &[(&str, String)],
+) -> Value {
+    let planning_s: f64 = stages
+        .iter()
+        .filter(|(name, _)| ["lay", "plan", "audit"].contains(name))
+        .map(|(_, time_s)| time_s)
+        .sum();
+    let mut plan = plan(&marked.plan, &marked.times);
+    plan["planning_s"] = json!(planning_s);
+    json!({
+        "plan": plan,
+        "limits": limits(marked.plan.limits()),
+        "twin": twin(&marked.score),
+        "files": object(files),
+        "stages_s": object(stages),
+        "seed": marked.seed,
+        "warnings": warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
+}
+
+/// Figures of a plan, without the time that planning took.
+pub fn plan(plan: &Plan, times: &PlanTimes) -> Value {
+    let planner = match plan.planner {
+        Planner::Classic => "classic",
+    };
+    json!({
+        "id": plan.id().to_string(),
+        "planner": planner,
+        "machine": plan.machine.name,
+        "period_us": f64::from(plan.machine.output.period_ns) * 1e-3,
+        "samples": plan.n_samples(),
+        "duration_s": times.duration_s,
+        "mark_s": times.mark_s,
+        "jump_s": times.jump_s,
+        "delay_s": times.delay_s,
+        "marks": plan.marks.len(),
+        "jumps": times.n_jumps,
+        "marked_mm": times.marked_mm,
+    })
+}
+
+/// Peaks of the audit.
+pub fn limits(limits: &Limits) -> Value {
+    json!({
+        "angle": limits.angle,
+        "speed": limits.speed,
+        "voltage": limits.voltage,
+        "current": limits.current,
+        "heat": limits.heat,
+        "violations": limits.violations,
+    })
+}
+
+fn twin(score: &Score) -> Value {
+    let contour = &score.contour_error_um;
+    let dose = score
+        .dose_ratio
+        .map(|dose| json!({"min": dose.min, "p01": dose.p01, "p99": dose.p99, "max": dose.max}));
+    json!({
+        "duration_s": score.duration_s,
+        "contour_error_um": {"max": contour.max, "p99": contour.p99, "rms": contour.rms},
+        "coverage_error_um": {
+            "max": score.coverage_error_um.max,
+            "p99": score.coverage_error_um.p99,
+        },
+        "end_error_um": {"max": score.end_error_um.max, "p99": score.end_error_um.p99},
+        "dose_ratio": dose,
+        "stray_energy_ratio": score.stray_energy_ratio,
+        "energy_j": score.energy_j,
+    })
+}
+
+fn object<T: Clone + Into<Value>>(rows: &[(&str, T)]) -> Value {
+    rows.iter()
+        .map(|(key, value)| ((*key).to_owned(), value.clone().into()))
+        .collect()
+}

@@ -1,0 +1,198 @@
+//! From an element's curves to shapes with paint and pen.
+
+use super::dash::dashed;
+use super::drawing::Node;
+use super::error::SvgError;
+use super::geometry::Geometry;
+use super::style::Paint as StylePaint;
+use super::walk::{Context, Reader};
+use ftheta_model::job::{Paint, Shape};
+use kurbo::{BezPath, PathEl, Point};
+
+/// Coordinates beyond this are taken for a mistake, mm.
+const COORDINATE_MAX_MM: f64 = 1e6;
+
+/// Marks the curves of a shape element.
+///
+/// # Errors
+/// If there are too many curves.
+pub fn shape<'a>(
+    reader: &mut Reader<'a, '_>,
+    node: Node<'a>,
+    geometry: Geometry,
+    context: &Context<'a>,
+) -> Result<(), SvgError> {
+    reader.warn_of_fault(node, geometry.fault);
+    if geometry.cut {
+        return Err(too_many_curves(reader, node));
+    }
+    if geometry.path.is_empty() {
+        reader.tally.n_dropped += 1;
+        if !matches!(node.tag_name().name(), "path" | "polyline" | "polygon") {
+            let place = reader.drawing.place(node);
+            reader
+                .warnings
+                .add(place, "its size is not above 0, left out");
+        }
+        return Ok(());
+    }
+    mark(reader, node, &geometry.path, geometry.area, context)
+}
+
+/// Marks curves with the fill and stroke of `context`, the fill first.
+///
+/// * `path`: curves in user units
+/// * `area`: whether they can be filled
+///
+/// # Errors
+/// If there are too many curves.
+pub fn mark<'a>(
+    reader: &mut Reader<'a, '_>,
+    node: Node<'a>,
+    path: &BezPath,
+    area: bool,
+    context: &Context<'a>,
+) -> Result<(), SvgError> {
+    let style = &context.style;
+    let mut visible = false;
+    if area && encloses(path) {
+        if let Some(color_rgb) = color_of(reader, node, style.visible_fill(), context) {
+            visible = true;
+            add(
+                reader,
+                node,
+                path.clone(),
+                (Paint::Fill(style.fill_rule), color_rgb),
+                context,
+            )?;
+        }
+    }
+    if let Some(color_rgb) = color_of(reader, node, style.visible_stroke(), context) {
+        visible = true;
+        let line = with_dashes(reader, node, path, context);
+        add(reader, node, line, (Paint::Stroke, color_rgb), context)?;
+    }
+    if !visible {
+        reader.tally.n_invisible += 1;
+    }
+    Ok(())
+}
+
+fn color_of<'a>(
+    reader: &mut Reader<'a, '_>,
+    node: Node<'a>,
+    paint: StylePaint<'a>,
+    context: &Context<'a>,
+) -> Option<[u8; 3]> {
+    if context.transparent {
+        return None;
+    }
+    let (color_rgb, message) = match paint {
+        StylePaint::None => return None,
+        StylePaint::Color(color_rgb) => return Some(color_rgb),
+        StylePaint::Server { color_rgb, id } => {
+            let [red, green, blue] = color_rgb;
+            let color = format!("#{red:02x}{green:02x}{blue:02x}");
+            (
+                Some(color_rgb),
+                format!("paint \"{id}\" is taken as the plain colour {color}"),
+            )
+        }
+        StylePaint::Missing(id) => (
+            None,
+            format!("paint \"{id}\" is not in this file, taken as none"),
+        ),
+    };
+    reader.warnings.add(reader.drawing.place(node), message);
+    color_rgb
+}
+
+fn with_dashes<'a>(
+    reader: &mut Reader<'a, '_>,
+    node: Node<'a>,
+    path: &BezPath,
+    context: &Context<'a>,
+) -> BezPath {
+    let style = &context.style;
+    if style.dashes.is_empty() {
+        return path.clone();
+    }
+    let cut = dashed(
+        path,
+        &style.dashes,
+        style.dash_offset,
+        context.mm_per_unit(),
+    );
+    cut.unwrap_or_else(|| {
+        let message = "more than a million dashes, marked as a full line";
+        reader.warnings.add(reader.drawing.place(node), message);
+        path.clone()
+    })
+}
+
+fn add<'a>(
+    reader: &mut Reader<'a, '_>,
+    node: Node<'a>,
+    mut path: BezPath,
+    (paint, color_rgb): (Paint, [u8; 3]),
+    context: &Context<'a>,
+) -> Result<(), SvgError> {
+    path.apply_affine(context.field_from_user);
+    let bounds = path.control_box();
+    let within = |value: f64| value.abs() <= COORDINATE_MAX_MM;
+    let inside = [bounds.x0, bounds.y0, bounds.x1, bounds.y1]
+        .into_iter()
+        .all(within);
+    let fault = if path.is_empty() || !path.is_finite() || !inside {
+        Some("coordinates beyond 1 km or not finite, left out")
+    } else if bounds.width() == 0.0 && bounds.height() == 0.0 {
+        Some("a single point without length, left out")
+    } else {
+        None
+    };
+    if let Some(fault) = fault {
+        reader.tally.n_dropped += 1;
+        reader.warnings.add(reader.drawing.place(node), fault);
+        return Ok(());
+    }
+    reader.tally.n_path_elements += path.elements().len();
+    if reader.limits.n_path_elements_max < reader.tally.n_path_elements {
+        return Err(too_many_curves(reader, node));
+    }
+    let pen_index = reader.marking.pen_index(color_rgb, context.scope);
+    let shape = Shape {
+        source: reader.drawing.place(node),
+        path,
+        paint,
+        pen_index,
+    };
+    reader.marking.add(context.scope, shape);
+    Ok(())
+}
+
+/// Whether any subpath can have an inside. A plain line has none, though SVG fills it by default:
+/// it would be marked twice.
+fn encloses(path: &BezPath) -> bool {
+    path.subpaths().any(|elements| {
+        let curved = |element: &PathEl| matches!(element, PathEl::QuadTo(..) | PathEl::CurveTo(..));
+        let mut points = elements.iter().filter_map(PathEl::end_point);
+        let Some(first) = points.next() else {
+            return false;
+        };
+        let second = points.find(|point| *point != first);
+        elements.iter().any(curved)
+            || second.is_some_and(|second| points.any(|third| off_line(first, second, third)))
+    })
+}
+
+fn off_line(a: Point, b: Point, c: Point) -> bool {
+    (b - a).cross(c - a) != 0.0
+}
+
+fn too_many_curves<'a>(reader: &Reader<'a, '_>, node: Node<'a>) -> SvgError {
+    SvgError::TooMany {
+        place: reader.drawing.place(node),
+        what: "path elements",
+        limit: reader.limits.n_path_elements_max,
+    }
+}

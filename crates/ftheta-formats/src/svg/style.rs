@@ -1,0 +1,321 @@
+//! Computed style: what an element inherits, overridden by what it states.
+
+use super::declared::{Declared, Property};
+use super::drawing::{Drawing, Node, href_of, tag_of};
+use super::length::{self, Direction, LengthBase};
+use ftheta_model::job::FillRule;
+use std::rc::Rc;
+use std::str::FromStr;
+use svgtypes::{Color, FontShorthand, LengthListParser, PaintFallback};
+
+/// Gradients that refer to each other are followed this far.
+const N_GRADIENT_LINKS_MAX: usize = 32;
+
+/// What an area or a line is painted with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Paint<'a> {
+    /// Nothing: it is not marked.
+    None,
+    /// A colour, RGB.
+    Color([u8; 3]),
+    /// A gradient or pattern, taken as one colour.
+    Server {
+        /// Its first colour, RGB.
+        color_rgb: [u8; 3],
+        /// Its id.
+        id: &'a str,
+    },
+    /// A reference that leads nowhere.
+    Missing(&'a str),
+}
+
+/// Where a text is anchored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// At its start.
+    Start,
+    /// In its middle.
+    Middle,
+    /// At its end.
+    End,
+}
+
+/// Inherited properties, in user units.
+#[derive(Clone, Debug)]
+pub struct Style<'a> {
+    color_rgb: [u8; 3],
+    /// Paint of areas.
+    pub fill: Paint<'a>,
+    /// Which side is inside.
+    pub fill_rule: FillRule,
+    fill_opacity: f64,
+    /// Paint of lines.
+    pub stroke: Paint<'a>,
+    stroke_opacity: f64,
+    /// Lengths of dashes and gaps; empty for none.
+    pub dashes: Rc<[f64]>,
+    /// Where in the dashes a line starts.
+    pub dash_offset: f64,
+    /// `visibility` is `visible`.
+    pub visible: bool,
+    /// Names of fonts, best first.
+    pub font_family: &'a str,
+    /// Font size.
+    pub font_size: f64,
+    /// Font weight, 100 to 900.
+    pub font_weight: u16,
+    /// Whether letters slant.
+    pub italic: bool,
+    /// Where text is anchored.
+    pub text_anchor: Anchor,
+    /// Added after each letter.
+    pub letter_spacing: f64,
+    /// Added after each space.
+    pub word_spacing: f64,
+}
+
+impl Default for Style<'_> {
+    fn default() -> Self {
+        Self {
+            color_rgb: [0; 3],
+            fill: Paint::Color([0; 3]),
+            fill_rule: FillRule::NonZero,
+            fill_opacity: 1.0,
+            stroke: Paint::None,
+            stroke_opacity: 1.0,
+            dashes: Rc::from([]),
+            dash_offset: 0.0,
+            visible: true,
+            font_family: "",
+            font_size: 16.0,
+            font_weight: 400,
+            italic: false,
+            text_anchor: Anchor::Start,
+            letter_spacing: 0.0,
+            word_spacing: 0.0,
+        }
+    }
+}
+
+impl<'a> Style<'a> {
+    /// Takes over what an element states.
+    pub fn apply(&mut self, declared: &Declared<'a>, viewport: [f64; 2], drawing: &Drawing<'a>) {
+        self.apply_font(declared, viewport);
+        if let Some(color) = declared.get(Property::Color).and_then(parse_color) {
+            self.color_rgb = rgb(color);
+        }
+        if let Some(text) = declared.get(Property::Fill) {
+            self.fill = self.paint(text, drawing).unwrap_or(self.fill);
+        }
+        if let Some(text) = declared.get(Property::Stroke) {
+            self.stroke = self.paint(text, drawing).unwrap_or(self.stroke);
+        }
+        match declared.get(Property::FillRule) {
+            Some("evenodd") => self.fill_rule = FillRule::EvenOdd,
+            Some("nonzero") => self.fill_rule = FillRule::NonZero,
+            _ => {}
+        }
+        if let Some(opacity) = declared.get(Property::FillOpacity).and_then(parse_opacity) {
+            self.fill_opacity = opacity;
+        }
+        if let Some(opacity) = declared
+            .get(Property::StrokeOpacity)
+            .and_then(parse_opacity)
+        {
+            self.stroke_opacity = opacity;
+        }
+        if let Some(text) = declared.get(Property::Visibility) {
+            self.visible = text == "visible";
+        }
+        let base = self.length_base(viewport);
+        if let Some(text) = declared.get(Property::StrokeDasharray) {
+            self.dashes = parse_dashes(text, &base);
+        }
+        if let Some(offset) = length_of(declared, Property::StrokeDashoffset, &base) {
+            self.dash_offset = offset;
+        }
+    }
+
+    fn apply_font(&mut self, declared: &Declared<'a>, viewport: [f64; 2]) {
+        let shorthand = declared
+            .get(Property::Font)
+            .and_then(|text| FontShorthand::from_str(text).ok());
+        let size = declared
+            .get(Property::FontSize)
+            .or(shorthand.as_ref().map(|font| font.font_size));
+        if let Some(size) = size.and_then(|text| self.parse_font_size(text, viewport)) {
+            self.font_size = size;
+        }
+        let family = declared
+            .get(Property::FontFamily)
+            .or(shorthand.as_ref().map(|font| font.font_family));
+        self.font_family = family.unwrap_or(self.font_family);
+        let weight = declared
+            .get(Property::FontWeight)
+            .or(shorthand.as_ref().and_then(|font| font.font_weight));
+        self.font_weight = match weight {
+            Some("normal") => 400,
+            Some("bold" | "bolder") => 700,
+            Some("lighter") => 300,
+            Some(number) => number.parse().unwrap_or(self.font_weight),
+            None => self.font_weight,
+        };
+        let slant = declared
+            .get(Property::FontStyle)
+            .or(shorthand.as_ref().and_then(|font| font.font_style));
+        self.italic = slant.map_or(self.italic, |slant| slant != "normal");
+        match declared.get(Property::TextAnchor) {
+            Some("start") => self.text_anchor = Anchor::Start,
+            Some("middle") => self.text_anchor = Anchor::Middle,
+            Some("end") => self.text_anchor = Anchor::End,
+            _ => {}
+        }
+        let base = self.length_base(viewport);
+        for (property, spacing) in [
+            (Property::LetterSpacing, &mut self.letter_spacing),
+            (Property::WordSpacing, &mut self.word_spacing),
+        ] {
+            *spacing = match declared.get(property) {
+                Some("normal") => 0.0,
+                _ => length_of(declared, property, &base).unwrap_or(*spacing),
+            };
+        }
+    }
+
+    /// What relative lengths refer to.
+    pub fn length_base(&self, viewport: [f64; 2]) -> LengthBase {
+        LengthBase {
+            font_size: self.font_size,
+            viewport,
+        }
+    }
+
+    /// Paint of areas, `Paint::None` where it cannot be seen.
+    pub fn visible_fill(&self) -> Paint<'a> {
+        if self.visible && self.fill_opacity != 0.0 {
+            self.fill
+        } else {
+            Paint::None
+        }
+    }
+
+    /// Paint of lines, `Paint::None` where it cannot be seen.
+    pub fn visible_stroke(&self) -> Paint<'a> {
+        if self.visible && self.stroke_opacity != 0.0 {
+            self.stroke
+        } else {
+            Paint::None
+        }
+    }
+
+    fn parse_font_size(&self, text: &str, viewport: [f64; 2]) -> Option<f64> {
+        // The named sizes of CSS 2.1 for a medium of 16 px.
+        let named = match text {
+            "xx-small" => 9.0,
+            "x-small" => 10.0,
+            "small" => 13.0,
+            "medium" => 16.0,
+            "large" => 18.0,
+            "x-large" => 24.0,
+            "xx-large" => 32.0,
+            "smaller" => self.font_size / 1.2,
+            "larger" => self.font_size * 1.2,
+            _ => {
+                let mut base = self.length_base(viewport);
+                // A percentage of a font size is one of the size around it.
+                base.viewport = [self.font_size; 2];
+                let (length, _) = length::parse(text)?;
+                return Some(base.user_units(length, Direction::X));
+            }
+        };
+        Some(named)
+    }
+
+    fn paint(&self, text: &'a str, drawing: &Drawing<'a>) -> Option<Paint<'a>> {
+        Some(match svgtypes::Paint::from_str(text).ok()? {
+            svgtypes::Paint::None => Paint::None,
+            svgtypes::Paint::Inherit => return None,
+            svgtypes::Paint::CurrentColor => Paint::Color(self.color_rgb),
+            svgtypes::Paint::Color(color) => visible_color(color),
+            svgtypes::Paint::FuncIRI(id, fallback) => match (drawing.by_id(id), fallback) {
+                (Some(server), _) => Paint::Server {
+                    color_rgb: first_stop(server, drawing).unwrap_or(self.color_rgb),
+                    id,
+                },
+                (None, Some(PaintFallback::Color(color))) => visible_color(color),
+                (None, Some(PaintFallback::CurrentColor)) => Paint::Color(self.color_rgb),
+                (None, Some(PaintFallback::None)) => Paint::None,
+                (None, None) => Paint::Missing(id),
+            },
+            svgtypes::Paint::ContextFill => self.fill,
+            svgtypes::Paint::ContextStroke => self.stroke,
+        })
+    }
+}
+
+/// Whether a value of `opacity` makes everything invisible.
+pub fn is_transparent(declared: &Declared<'_>) -> bool {
+    declared.get(Property::Opacity).and_then(parse_opacity) == Some(0.0)
+}
+
+fn length_of(declared: &Declared<'_>, property: Property, base: &LengthBase) -> Option<f64> {
+    let (length, _) = length::parse(declared.get(property)?)?;
+    Some(base.user_units(length, Direction::Any))
+}
+
+/// Dashes as SVG wants them: none if one is negative or all are zero.
+fn parse_dashes(text: &str, base: &LengthBase) -> Rc<[f64]> {
+    let dashes: Result<Vec<f64>, _> = LengthListParser::from(text)
+        .map(|length| length.map(|length| base.user_units(length, Direction::Any)))
+        .collect();
+    match dashes {
+        Ok(dashes)
+            if dashes.iter().all(|&dash| 0.0 <= dash) && dashes.iter().sum::<f64>() > 0.0 =>
+        {
+            dashes.into()
+        }
+        _ => Rc::from([]),
+    }
+}
+
+/// An opacity, held between 0 and 1.
+fn parse_opacity(text: &str) -> Option<f64> {
+    let opacity = match text.strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().ok()? / 100.0,
+        None => text.parse::<f64>().ok()?,
+    };
+    (!opacity.is_nan()).then(|| opacity.clamp(0.0, 1.0))
+}
+
+fn parse_color(text: &str) -> Option<Color> {
+    Color::from_str(text).ok()
+}
+
+fn rgb(color: Color) -> [u8; 3] {
+    [color.red, color.green, color.blue]
+}
+
+fn visible_color<'a>(color: Color) -> Paint<'a> {
+    if color.alpha == 0 {
+        Paint::None
+    } else {
+        Paint::Color(rgb(color))
+    }
+}
+
+/// The first colour of a gradient, which may have its stops from another one.
+fn first_stop(server: Node<'_>, drawing: &Drawing<'_>) -> Option<[u8; 3]> {
+    let mut server = drawing.by_id(super::drawing::plain_attribute(server, "id")?)?;
+    for _ in 0..N_GRADIENT_LINKS_MAX {
+        let stop = server
+            .children()
+            .find(|child| tag_of(*child) == Some("stop"));
+        if let Some(stop) = stop {
+            let declared = Declared::of(stop, &drawing.style_sheets);
+            let color = declared.get(Property::StopColor).and_then(parse_color);
+            return Some(color.map_or([0; 3], rgb));
+        }
+        server = drawing.by_id(href_of(server)?.strip_prefix('#')?)?;
+    }
+    None
+}

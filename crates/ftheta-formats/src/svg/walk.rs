@@ -1,0 +1,380 @@
+//! Goes through the elements in drawing order and hands over what is marked.
+
+use super::declared::{Declared, Property};
+use super::drawing::{Drawing, Node, href_of, plain_attribute, tag_of};
+use super::error::SvgError;
+use super::geometry::{self, Lengths, Scale};
+use super::layer;
+use super::length::Direction;
+use super::marking::{Marking, ScopeIndex};
+use super::page::{Page, view_box_map, view_box_of};
+use super::style::{Style, is_transparent};
+use super::tally::Tally;
+use super::warnings::Warnings;
+use super::{Limits, emit, text};
+use ftheta_model::recipe::Recipe;
+use kurbo::{Affine, Vec2};
+use roxmltree::NodeId;
+use std::str::FromStr;
+use svgtypes::AspectRatio;
+
+/// What an element gets from those around it.
+#[derive(Clone)]
+pub struct Context<'a> {
+    /// From the element's user units to field mm.
+    pub field_from_user: Affine,
+    /// Size of the nearest viewport, user units.
+    pub viewport: [f64; 2],
+    /// Inherited properties.
+    pub style: Style<'a>,
+    /// Something around it has opacity 0.
+    pub transparent: bool,
+    /// The layer it is on.
+    pub scope: ScopeIndex,
+    depth: usize,
+}
+
+impl Context<'_> {
+    /// Greatest scale of the user units, mm; never zero.
+    pub fn mm_per_unit(&self) -> f64 {
+        let [a, b, c, d, ..] = self.field_from_user.as_coeffs();
+        let scale = a.hypot(b).max(c.hypot(d));
+        if scale.is_normal() { scale } else { 1.0 }
+    }
+}
+
+/// Reads elements into a [`Marking`].
+pub struct Reader<'a, 'r> {
+    /// The parsed file.
+    pub drawing: &'a Drawing<'a>,
+    /// What the user sets.
+    pub recipe: &'r Recipe,
+    /// Limits of time and memory.
+    pub limits: Limits,
+    /// Shapes so far.
+    pub marking: Marking<'r>,
+    /// Warnings so far.
+    pub warnings: Warnings,
+    /// Counts of what was drawn and what was not.
+    pub tally: Tally,
+    /// The `use` elements that are being expanded.
+    uses: Vec<NodeId>,
+}
+
+impl<'a, 'r> Reader<'a, 'r> {
+    /// Nothing read yet.
+    pub fn new(drawing: &'a Drawing<'a>, recipe: &'r Recipe, limits: Limits) -> Self {
+        Self {
+            drawing,
+            recipe,
+            limits,
+            marking: Marking::new(recipe),
+            warnings: Warnings::default(),
+            tally: Tally::default(),
+            uses: Vec::new(),
+        }
+    }
+
+    /// Reads the whole drawing onto `page`.
+    ///
+    /// # Errors
+    /// If a limit is passed.
+    pub fn read(&mut self, page: &Page) -> Result<(), SvgError> {
+        let root = self.drawing.root();
+        let mut context = Context {
+            field_from_user: page.field_from_user,
+            viewport: page.viewport,
+            style: Style::default(),
+            transparent: false,
+            scope: self.marking.open(None, Vec::new()),
+            depth: 0,
+        };
+        if self.enter(root, &mut context)? {
+            self.children(root, &context)?;
+        }
+        if self.drawing.style_sheets.incomplete.get() {
+            self.warnings
+                .add("<style>", "too many rules to look at, some were ignored");
+        }
+        Ok(())
+    }
+
+    fn children(&mut self, node: Node<'a>, around: &Context<'a>) -> Result<(), SvgError> {
+        for child in node.children().filter(Node::is_element) {
+            self.element(child, around)?;
+        }
+        Ok(())
+    }
+
+    fn element(&mut self, node: Node<'a>, around: &Context<'a>) -> Result<(), SvgError> {
+        let Some(tag) = tag_of(node) else {
+            return Ok(());
+        };
+        match tag {
+            "defs" | "desc" | "metadata" | "style" | "symbol" | "title" | "view" | "namedview"
+            | "linearGradient" | "radialGradient" | "pattern" | "clipPath" | "mask" | "marker"
+            | "filter" | "font" | "cursor" | "color-profile" | "pgf" => return Ok(()),
+            _ => {}
+        }
+        if let Some(reason) = ignored(tag) {
+            self.tally.ignored(tag);
+            self.warnings.add(self.drawing.place(node), reason);
+            return Ok(());
+        }
+        let mut context = around.clone();
+        if !self.enter(node, &mut context)? {
+            return Ok(());
+        }
+        match tag {
+            "g" | "a" => self.group(node, context),
+            "svg" => self.inner_svg(node, node, context, None),
+            "switch" => match node.children().find(|child| switch_takes(*child)) {
+                Some(child) => self.element(child, &context),
+                None => Ok(()),
+            },
+            "use" => self.expand(node, context),
+            "text" => text::mark(self, node, &context),
+            _ => self.shape(node, tag, &context),
+        }
+    }
+
+    /// Applies what the element states to `context`; false if it is not displayed.
+    ///
+    /// # Errors
+    /// If a limit is passed.
+    pub fn enter(&mut self, node: Node<'a>, context: &mut Context<'a>) -> Result<bool, SvgError> {
+        context.depth += 1;
+        if self.limits.depth_max < context.depth {
+            return Err(SvgError::TooDeep {
+                place: self.drawing.place(node),
+                limit: self.limits.depth_max,
+            });
+        }
+        self.tally.n_elements += 1;
+        if self.limits.n_elements_max < self.tally.n_elements {
+            return Err(SvgError::TooMany {
+                place: self.drawing.place(node),
+                what: "elements, those repeated by <use> included",
+                limit: self.limits.n_elements_max,
+            });
+        }
+        let declared = Declared::of(node, &self.drawing.style_sheets);
+        if declared.get(Property::Display) == Some("none") {
+            self.tally.n_invisible += 1;
+            return Ok(false);
+        }
+        self.warn_of_effects(node, &declared);
+        context
+            .style
+            .apply(&declared, context.viewport, self.drawing);
+        context.transparent |= is_transparent(&declared);
+        if let Some(text) = declared
+            .get(Property::Transform)
+            .filter(|text| *text != "none")
+        {
+            let Some(transform) = transform_of(text) else {
+                self.tally.n_dropped += 1;
+                let message = format!("transform=\"{text}\" cannot be read, left out");
+                self.warnings.add(self.drawing.place(node), message);
+                return Ok(false);
+            };
+            context.field_from_user *= transform;
+        }
+        Ok(true)
+    }
+
+    fn warn_of_effects(&mut self, node: Node<'a>, declared: &Declared<'a>) {
+        let effects = [
+            (Property::ClipPath, "clip-path is ignored, marked unclipped"),
+            (Property::Mask, "mask is ignored, marked unmasked"),
+            (Property::Filter, "filter is ignored"),
+            (Property::Marker, "markers are ignored"),
+            (Property::MarkerStart, "markers are ignored"),
+            (Property::MarkerMid, "markers are ignored"),
+            (Property::MarkerEnd, "markers are ignored"),
+        ];
+        if let Some((_, message)) = effects.iter().find(|effect| declared.refers(effect.0)) {
+            self.warnings.add(self.drawing.place(node), *message);
+        }
+    }
+
+    fn group(&mut self, node: Node<'a>, mut context: Context<'a>) -> Result<(), SvgError> {
+        if let Some(names) = layer::names_of(node, self.drawing) {
+            context.scope = self.marking.open(Some(context.scope), names);
+        }
+        self.children(node, &context)
+    }
+
+    /// An `<svg>` or `<symbol>`: `placed` states where it is put, `content` holds the children.
+    fn inner_svg(
+        &mut self,
+        content: Node<'a>,
+        placed: Node<'a>,
+        mut context: Context<'a>,
+        size: Option<[Option<f64>; 2]>,
+    ) -> Result<(), SvgError> {
+        let mut lengths = self.lengths(placed, &context);
+        let [width, height] = size.unwrap_or_else(|| {
+            let width = lengths.optional("width", Direction::X);
+            [width, lengths.optional("height", Direction::Y)]
+        });
+        let corner = if size.is_some() {
+            // The corner of a `use` is part of its own transform already.
+            Vec2::ZERO
+        } else {
+            let x = lengths.get("x", Direction::X);
+            Vec2::new(x, lengths.get("y", Direction::Y))
+        };
+        self.warn_of_fault(placed, lengths.fault);
+        let size = [
+            width.unwrap_or(context.viewport[0]),
+            height.unwrap_or(context.viewport[1]),
+        ];
+        context.field_from_user *= Affine::translate(corner);
+        let view_box = match view_box_of(content) {
+            Ok(view_box) => view_box,
+            Err(error) => {
+                self.tally.n_dropped += 1;
+                self.warnings
+                    .add(self.drawing.place(content), error.to_string());
+                return Ok(());
+            }
+        };
+        if !size.iter().all(|side| 0.0 < *side) {
+            self.tally.n_dropped += 1;
+            self.warnings.add(
+                self.drawing.place(placed),
+                "its size is not above 0, left out",
+            );
+            return Ok(());
+        }
+        context.viewport = size;
+        if let Some(view_box) = view_box {
+            let aspect = plain_attribute(content, "preserveAspectRatio")
+                .and_then(|text| AspectRatio::from_str(text).ok())
+                .unwrap_or_default();
+            context.field_from_user *= view_box_map(size, view_box, aspect);
+            context.viewport = [view_box.w, view_box.h];
+        }
+        self.children(content, &context)
+    }
+
+    fn expand(&mut self, node: Node<'a>, mut context: Context<'a>) -> Result<(), SvgError> {
+        let href = href_of(node).unwrap_or("");
+        let Some(target) = href.strip_prefix('#').and_then(|id| self.drawing.by_id(id)) else {
+            self.tally.n_dropped += 1;
+            let message = format!("refers to \"{href}\", which is not in this file, left out");
+            self.warnings.add(self.drawing.place(node), message);
+            return Ok(());
+        };
+        let around_itself = node.ancestors().any(|outer| outer == target);
+        if around_itself || self.uses.contains(&node.id()) {
+            self.tally.n_dropped += 1;
+            let message = format!("refers to \"{href}\", which contains it, left out");
+            self.warnings.add(self.drawing.place(node), message);
+            return Ok(());
+        }
+        let mut lengths = self.lengths(node, &context);
+        let corner = Vec2::new(
+            lengths.get("x", Direction::X),
+            lengths.get("y", Direction::Y),
+        );
+        let width = lengths.optional("width", Direction::X);
+        let height = lengths.optional("height", Direction::Y);
+        self.warn_of_fault(node, lengths.fault);
+        context.field_from_user *= Affine::translate(corner);
+        self.uses.push(node.id());
+        let result = self.used(target, context, [width, height]);
+        self.uses.pop();
+        result
+    }
+
+    fn used(
+        &mut self,
+        target: Node<'a>,
+        mut context: Context<'a>,
+        size: [Option<f64>; 2],
+    ) -> Result<(), SvgError> {
+        match tag_of(target) {
+            Some("symbol") => {
+                if self.enter(target, &mut context)? {
+                    self.inner_svg(target, target, context, Some(size))?;
+                }
+                Ok(())
+            }
+            _ => self.element(target, &context),
+        }
+    }
+
+    fn shape(&mut self, node: Node<'a>, tag: &str, context: &Context<'a>) -> Result<(), SvgError> {
+        let scale = Scale {
+            base: context.style.length_base(context.viewport),
+            mm_per_unit: context.mm_per_unit(),
+            n_elements_max: self.limits.n_path_elements_max - self.tally.n_path_elements,
+        };
+        match geometry::of(node, tag, &scale) {
+            Some(geometry) => emit::shape(self, node, geometry, context),
+            None => {
+                self.tally.n_dropped += 1;
+                self.warnings
+                    .add(self.drawing.place(node), "unknown element, left out");
+                Ok(())
+            }
+        }
+    }
+
+    /// Reads lengths of an element.
+    pub fn lengths(&self, node: Node<'a>, context: &Context<'a>) -> Lengths<'a> {
+        Lengths {
+            node,
+            base: context.style.length_base(context.viewport),
+            fault: None,
+        }
+    }
+
+    /// Passes a fault of an element's attributes on as a warning.
+    pub fn warn_of_fault(&mut self, node: Node<'a>, fault: Option<String>) {
+        if let Some(fault) = fault {
+            self.warnings.add(self.drawing.place(node), fault);
+        }
+    }
+}
+
+/// Why an element that could be seen is not marked.
+fn ignored(tag: &str) -> Option<&'static str> {
+    Some(match tag {
+        "image" => "raster image, left out",
+        "foreignObject" => "foreign content, left out",
+        "script" => "script, not run",
+        "animate" | "animateColor" | "animateMotion" | "animateTransform" | "set" => {
+            "animation, left out"
+        }
+        "flowRoot" => "flowed text, left out; convert it to text in Inkscape",
+        "video" | "audio" | "iframe" | "canvas" => "media, left out",
+        _ => return None,
+    })
+}
+
+/// Whether a child of `<switch>` is for a reader like this one.
+fn switch_takes(child: Node<'_>) -> bool {
+    let language_fits = plain_attribute(child, "systemLanguage").is_none_or(|languages| {
+        languages
+            .split(',')
+            .any(|name| name.trim().starts_with("en"))
+    });
+    child.is_element()
+        && tag_of(child).is_some_and(|tag| ignored(tag).is_none())
+        && plain_attribute(child, "requiredExtensions").is_none_or(str::is_empty)
+        && language_fits
+}
+
+/// A transform list as one map; `None` if it is wrong or flattens everything.
+fn transform_of(text: &str) -> Option<Affine> {
+    // CSS writes `deg` and `px` where attributes have plain numbers.
+    let plain = text.replace("deg", "").replace("px", "");
+    let matrix = svgtypes::Transform::from_str(&plain).ok()?;
+    let svgtypes::Transform { a, b, c, d, e, f } = matrix;
+    let transform = Affine::new([a, b, c, d, e, f]);
+    let usable = transform.is_finite() && transform.determinant() != 0.0;
+    usable.then_some(transform)
+}

@@ -1,0 +1,152 @@
+//! Machine and recipe files: presets, round trips, and what is said of a faulty file.
+
+use expect_test::{Expect, expect};
+use ftheta_formats::{machine, recipe};
+use ftheta_model::machine::Lens;
+
+#[test]
+fn every_preset_reads_and_survives_a_round_trip() {
+    for name in machine::PRESETS {
+        let preset = machine::preset(name).unwrap().unwrap();
+        assert_eq!(preset.name, name);
+        let again = machine::read(name, &machine::to_toml(&preset)).unwrap();
+        assert_eq!(preset, again);
+    }
+}
+
+#[test]
+fn bare_names_have_their_lens() {
+    for (bare, f1_mm, wavelength_nm) in [
+        ("S10", 163.064, 355.0),
+        ("S14", 255.059, 532.0),
+        ("S25", 420.456, 1064.0),
+    ] {
+        let preset = machine::preset(bare).unwrap().unwrap();
+        let Lens::FTheta { coefficients_mm } = &preset.optics.lens else {
+            panic!("a lens")
+        };
+        assert_eq!(
+            (coefficients_mm[0], preset.laser.wavelength_nm),
+            (f1_mm, wavelength_nm)
+        );
+    }
+    assert!(machine::preset("S11").is_none());
+}
+
+/// The stated spot is what wavelength, beam quality and beam diameter give, within 2 %.
+#[test]
+fn spots_of_presets_follow_from_their_beams() {
+    for name in machine::PRESETS {
+        let stated = machine::preset(name)
+            .unwrap()
+            .unwrap()
+            .laser
+            .spot_diameter_mm;
+        let text: String = machine::preset_text(name)
+            .unwrap()
+            .lines()
+            .filter(|line| !line.starts_with("spot_diameter"))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        let computed = machine::read(name, &text).unwrap().laser.spot_diameter_mm;
+        assert!(
+            (computed / stated - 1.0).abs() < 0.02,
+            "{name}: {computed} against {stated}"
+        );
+    }
+}
+
+fn check(from: &str, to: &str, expected: Expect) {
+    let text = machine::preset_text("S10").unwrap();
+    assert!(text.contains(from), "{from}");
+    let error = machine::read("my.toml", &text.replacen(from, to, 1)).unwrap_err();
+    expected.assert_eq(&error.to_string());
+}
+
+#[test]
+fn faults_name_line_value_and_limit() {
+    check(
+        "coil_inductance_uh = 180.0",
+        "coil_inductance = 180.0",
+        expect![[
+            "my.toml:10: unknown key scanner.coil_inductance, the unit is missing: did you mean coil_inductance_uh?"
+        ]],
+    );
+    check(
+        "coil_resistance_ohm = 2.79",
+        "coil_resistance_ohm = -2.79",
+        expect![["my.toml:9: scanner.coil_resistance_ohm = -2.79 is outside 0.01 to 1000"]],
+    );
+    check(
+        "voltage_max_v = 24.0",
+        "voltage_max_v = nan",
+        expect![["my.toml:13: scanner.voltage_max_v = nan is outside 0.1 to 1000"]],
+    );
+    check(
+        "thermal_time_s = 1.0",
+        "thermal_tmie_s = 1.0",
+        expect![["my.toml:16: unknown key scanner.thermal_tmie_s, did you mean thermal_time_s?"]],
+    );
+    check(
+        "thermal_time_s = 1.0",
+        "thermal_time = 1.0",
+        expect![[
+            "my.toml:16: unknown key scanner.thermal_time, the unit is missing: did you mean thermal_time_s?"
+        ]],
+    );
+    check(
+        "first_mirror = \"x\"",
+        "first_mirror = \"z\"",
+        expect![[r#"my.toml:31: optics.first_mirror = "z" is outside "x", "y""#]],
+    );
+    check(
+        "word_bits = 20",
+        "word_bits = 20.5",
+        expect![["my.toml:46: output.word_bits is a float, expected a whole number"]],
+    );
+    check(
+        "period_us = 10.0",
+        "period_us = 0",
+        expect![["my.toml:45: output.period_us = 0 is outside 1 to 100"]],
+    );
+    check(
+        "[optics]",
+        "[optics",
+        expect![["my.toml:28: unclosed table, expected `]`"]],
+    );
+}
+
+#[test]
+fn recipe_reads_pens_and_delays() {
+    let text = r##"
+        [[pen]]
+        name = "fill"
+        color = "#F00"
+        hatch_spacing_mm = 0.05
+        [[pen]]
+        layer = "Cut"
+        mark_speed_mm_s = 250
+        passes = 3
+        [classic]
+        jump_delay_us = 120
+        laser_on_delay_us = -12.5
+    "##;
+    let recipe = recipe::read("r.toml", text).unwrap();
+    assert_eq!(recipe.pens[0].color_rgb, Some([255, 0, 0]));
+    assert_eq!(recipe.pens[0].pen.hatch.unwrap().spacing_mm, 0.05);
+    assert_eq!(
+        (
+            recipe.pens[1].pen.n_passes,
+            recipe.pens[1].pen.name.as_str()
+        ),
+        (3, "Cut")
+    );
+    assert_eq!(recipe.classic.laser_on_delay_ns, Some(-12_500));
+    let error = recipe::read("r.toml", "[[pen]]\nspeed = 3")
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        error,
+        "r.toml:2: unknown key pen.speed, did you mean mark_speed_mm_s?"
+    );
+}

@@ -1,0 +1,256 @@
+//! Renders a plan into blocks of output words: the only place where millimetres become codes.
+
+use ftheta_model::block::{Block, LaserEdge};
+use ftheta_model::plan::{Motion, SpeedProfile};
+use ftheta_model::recipe::Interpolation;
+use ftheta_model::space::{DacCodes, FieldPoint};
+use ftheta_physics::map_table::MapTable;
+use ftheta_physics::optics::angles_from_field;
+use ftheta_physics::plan::Plan;
+use kurbo::{Point, Vec2};
+
+/// Samples of a block.
+pub const BLOCK_SAMPLES: usize = 4096;
+
+/// Cells around the centre of the table that are left to the exact inverse: keeps 1 nm there.
+const EXACT_CELLS: f64 = 3.0;
+
+/// A DDA adds increments of this share of a word's step.
+const DDA_FRACTION: f64 = 1.0 / 256.0;
+
+/// Yields the blocks of a plan one after the other; memory does not grow with the plan.
+pub struct Renderer<'a> {
+    plan: &'a Plan,
+    words: Words<'a>,
+    segment_index: usize,
+    /// Samples of the segment already rendered.
+    n_rendered: u32,
+    cursor: Cursor,
+    next_index: u64,
+    /// Laser edges already given: two per mark.
+    n_edges: usize,
+}
+
+/// The state of a walk along a path.
+#[derive(Clone, Copy, Debug)]
+struct Cursor {
+    /// Vertex at the start of the leg.
+    leg: usize,
+    /// Path length up to that vertex, and up to the leg's end, mm.
+    start_mm: f64,
+    end_mm: f64,
+    from: Point,
+    direction: Vec2,
+}
+
+/// Turns places into words.
+struct Words<'a> {
+    plan: &'a Plan,
+    table: Option<MapTable>,
+    words_per_rad: f64,
+}
+
+impl<'a> Renderer<'a> {
+    /// Starts before the first sample.
+    pub fn new(plan: &'a Plan) -> Self {
+        let output = &plan.machine.output;
+        let optics = &plan.machine.optics;
+        let table = MapTable::new(0.5 * optics.field_mm, EXACT_CELLS, |x, y| {
+            let angles = angles_from_field(optics, FieldPoint::new(x, y))?;
+            Some([angles.x_rad, angles.y_rad])
+        });
+        let words = Words {
+            plan,
+            table,
+            words_per_rad: 1.0 / output.word_step_rad(),
+        };
+        let cursor = Cursor::at(&plan.vertices, 0);
+        Self {
+            plan,
+            words,
+            segment_index: 0,
+            n_rendered: 0,
+            cursor,
+            next_index: 0,
+            n_edges: 0,
+        }
+    }
+
+    /// Fills `block` with what comes next; `false` after the end.
+    pub fn next_block(&mut self, block: &mut Block) -> bool {
+        block.first_index = self.next_index;
+        block.words.clear();
+        block.edges.clear();
+        while block.words.len() < BLOCK_SAMPLES {
+            let Some(segment) = self.plan.segments.get(self.segment_index) else {
+                break;
+            };
+            let room = (BLOCK_SAMPLES - block.words.len()) as u32;
+            let end = segment.n_ticks.min(self.n_rendered.saturating_add(room));
+            self.render(&segment.motion, end, segment.n_ticks, &mut block.words);
+            self.n_rendered = end;
+            if end == segment.n_ticks {
+                self.segment_index += 1;
+                self.n_rendered = 0;
+                if let Some(next) = self.plan.segments.get(self.segment_index) {
+                    self.cursor = Cursor::at(&self.plan.vertices, first_vertex(&next.motion));
+                }
+            }
+        }
+        self.next_index += block.words.len() as u64;
+        self.push_edges(block);
+        !block.words.is_empty()
+    }
+
+    /// Appends samples `n_rendered + 1 ..= end` of a segment of `n_ticks`.
+    fn render(&mut self, motion: &Motion, end: u32, n_ticks: u32, words: &mut Vec<DacCodes>) {
+        let period_s = self.plan.machine.output.period_s();
+        let first = self.n_rendered + 1;
+        match *motion {
+            Motion::Hold { vertex } => {
+                let word = self.words.at(self.plan.vertices[vertex as usize]);
+                words.resize(words.len() + (end + 1 - first) as usize, word);
+            }
+            Motion::Travel {
+                profile,
+                interpolation: Interpolation::Dda,
+                ..
+            } => {
+                let (start, step) = self.dda(&profile, n_ticks);
+                for tick in first..=end {
+                    words.push(self.words.at(start + step * f64::from(tick)));
+                }
+            }
+            Motion::Travel {
+                first_vertex,
+                n_vertices,
+                profile,
+                ..
+            } => {
+                let last = (first_vertex + n_vertices) as usize - 1;
+                let constant = profile.acceleration_mm_s2 == f64::INFINITY
+                    && profile.deceleration_mm_s2 == f64::INFINITY;
+                for tick in first..=end {
+                    let time_s = f64::from(tick) * period_s;
+                    let distance_mm = if constant {
+                        (profile.speed_mm_s * time_s).min(profile.length_mm)
+                    } else {
+                        profile.distance_mm(time_s)
+                    };
+                    let place = if tick == n_ticks {
+                        self.plan.vertices[last]
+                    } else {
+                        self.cursor.advance(&self.plan.vertices, last, distance_mm)
+                    };
+                    words.push(self.words.at(place));
+                }
+            }
+        }
+    }
+
+    /// Start and rounded increment of a single vector by DDA. Adding the increment tick by tick
+    /// and multiplying it by the tick is the same here, since it is a whole number of fractions.
+    fn dda(&self, profile: &SpeedProfile, n_ticks: u32) -> (Point, Vec2) {
+        let scale = ftheta_physics::optics::scale_mm_per_rad(&self.plan.machine.optics);
+        let fraction_mm = scale * DDA_FRACTION / self.words.words_per_rad;
+        let exact = self.cursor.direction * (profile.length_mm / f64::from(n_ticks));
+        let step = Vec2::new(
+            (exact.x / fraction_mm).round() * fraction_mm,
+            (exact.y / fraction_mm).round() * fraction_mm,
+        );
+        (self.cursor.from, step)
+    }
+
+    fn push_edges(&mut self, block: &mut Block) {
+        let end_ns = self.next_index * u64::from(self.plan.machine.output.period_ns);
+        while let Some(mark) = self.plan.marks.get(self.n_edges / 2) {
+            let edge = if self.n_edges.is_multiple_of(2) {
+                LaserEdge {
+                    time_ns: mark.on_ns,
+                    power_w: mark.power_w,
+                }
+            } else {
+                LaserEdge {
+                    time_ns: mark.off_ns,
+                    power_w: 0.0,
+                }
+            };
+            if edge.time_ns >= end_ns {
+                break;
+            }
+            block.edges.push(edge);
+            self.n_edges += 1;
+        }
+    }
+}
+
+impl Cursor {
+    fn at(vertices: &[Point], leg: usize) -> Self {
+        let mut cursor = Self {
+            leg,
+            start_mm: 0.0,
+            end_mm: 0.0,
+            from: vertices[leg],
+            direction: Vec2::ZERO,
+        };
+        cursor.enter(vertices);
+        cursor
+    }
+
+    /// Sets the leg's own values; the leg after the last vertex has no length.
+    fn enter(&mut self, vertices: &[Point]) {
+        self.from = vertices[self.leg];
+        let along = vertices
+            .get(self.leg + 1)
+            .map_or(Vec2::ZERO, |&to| to - self.from);
+        let length_mm = along.hypot();
+        self.end_mm = self.start_mm + length_mm;
+        self.direction = if length_mm > 0.0 {
+            along / length_mm
+        } else {
+            Vec2::ZERO
+        };
+    }
+
+    /// The place at `distance_mm` along the path; distances never fall.
+    #[inline]
+    fn advance(&mut self, vertices: &[Point], last: usize, distance_mm: f64) -> Point {
+        while distance_mm > self.end_mm && self.leg + 1 < last {
+            self.leg += 1;
+            self.start_mm = self.end_mm;
+            self.enter(vertices);
+        }
+        self.from + self.direction * (distance_mm - self.start_mm)
+    }
+}
+
+impl Words<'_> {
+    /// The word pair for a place.
+    #[inline]
+    fn at(&self, place: Point) -> DacCodes {
+        let tabled = self
+            .table
+            .as_ref()
+            .and_then(|table| table.value(place.x, place.y));
+        let [x_rad, y_rad] = tabled.unwrap_or_else(|| self.exact(place));
+        DacCodes {
+            x: (x_rad * self.words_per_rad).round_ties_even() as i32,
+            y: (y_rad * self.words_per_rad).round_ties_even() as i32,
+        }
+    }
+
+    /// The exact inverse, for places that the table leaves out.
+    #[cold]
+    fn exact(&self, place: Point) -> [f64; 2] {
+        angles_from_field(&self.plan.machine.optics, place.into())
+            .map(|angles| [angles.x_rad, angles.y_rad])
+            .expect("the audit has reached every place of the plan")
+    }
+}
+
+fn first_vertex(motion: &Motion) -> usize {
+    match *motion {
+        Motion::Hold { vertex } => vertex as usize,
+        Motion::Travel { first_vertex, .. } => first_vertex as usize,
+    }
+}

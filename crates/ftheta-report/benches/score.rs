@@ -1,0 +1,155 @@
+//! Scoring 5 million points (10 s of beam): wavy curves, and hatch lines.
+
+use divan::Bencher;
+use ftheta_model::machine::{
+    Axis, Drive, Laser, Lens, Machine, Optics, Output, Scanner, Sensor, Servo,
+};
+use ftheta_model::plan::{PlanDraft, PlannedMark, Planner};
+use ftheta_model::recipe::Pen;
+use ftheta_model::space::FieldPoint;
+use ftheta_model::trace::{Light, Trace, TracePoint};
+use ftheta_report::score::score;
+use kurbo::{BezPath, ParamCurve, Point};
+
+const N_POINTS: u64 = 5_000_000;
+const STEP_NS: u64 = 2000;
+
+fn main() {
+    divan::main();
+}
+
+/// Marks one after the other at 1 m/s, each lit from end to end with an error of some µm.
+fn scene(curves: &[BezPath]) -> (PlanDraft, Trace) {
+    let mut trace = Trace {
+        step_ns: STEP_NS,
+        ..Trace::default()
+    };
+    let mut marks = Vec::new();
+    'marks: for index in 0.. {
+        let curve = &curves[index % curves.len()];
+        let on_ns = trace.points.len() as u64 * STEP_NS;
+        for segment in curve.segments() {
+            let length_mm = segment.start().distance(segment.end()).max(0.01) * 1.05;
+            let n = (length_mm / 0.002) as usize;
+            for i in 0..n {
+                let wobble = 0.003 * (0.01 * trace.points.len() as f64).sin();
+                let place = segment.eval(i as f64 / n as f64) + kurbo::Vec2::new(wobble, wobble);
+                trace.points.push(TracePoint::from(FieldPoint::from(place)));
+            }
+            if trace.points.len() as u64 > N_POINTS {
+                break 'marks;
+            }
+        }
+        trace.light.push(Light {
+            index,
+            on_ns,
+            off_ns: (trace.points.len() as u64 - 1) * STEP_NS,
+            power_w: 10.0,
+        });
+        marks.push(PlannedMark {
+            curve: curve.clone(),
+            pen_index: 0,
+            source: String::new(),
+            on_ns: 0,
+            off_ns: 0,
+            power_w: 10.0,
+        });
+    }
+    let plan = PlanDraft {
+        machine: machine(),
+        planner: Planner::Classic,
+        tolerance_mm: 0.01,
+        pens: vec![Pen::default()],
+        marks,
+        vertices: Vec::new(),
+        segments: Vec::new(),
+    };
+    (plan, trace)
+}
+
+/// Waves of `length_mm` each, 20 to a mark.
+fn waves(length_mm: f64) -> BezPath {
+    let mut path = BezPath::new();
+    path.move_to((0.0, 0.0));
+    for i in 0..20 {
+        let x = f64::from(i) * length_mm;
+        let up = if i % 2 == 0 { length_mm } else { -length_mm };
+        path.curve_to(
+            Point::new(x + 0.3 * length_mm, up),
+            Point::new(x + 0.7 * length_mm, up),
+            Point::new(x + length_mm, 0.0),
+        );
+    }
+    path
+}
+
+#[divan::bench(args = [0.3, 3.0], sample_count = 3)]
+fn curves_5_million_points(bencher: Bencher<'_, '_>, length_mm: f64) {
+    let (plan, trace) = scene(&[waves(length_mm)]);
+    bencher.bench(|| score(&plan, &trace));
+}
+
+#[divan::bench(sample_count = 3)]
+fn hatch_5_million_points(bencher: Bencher<'_, '_>) {
+    let line = |y: f64| {
+        BezPath::from_vec(vec![
+            kurbo::PathEl::MoveTo((0.0, y).into()),
+            kurbo::PathEl::LineTo((5.0, y).into()),
+        ])
+    };
+    let lines: Vec<BezPath> = (0..100).map(|i| line(f64::from(i) * 0.05)).collect();
+    let (plan, trace) = scene(&lines);
+    bencher.bench(|| score(&plan, &trace));
+}
+
+fn machine() -> Machine {
+    Machine {
+        name: "test".into(),
+        scanner: Scanner {
+            rotor_inertia_kg_m2: 1e-8,
+            mirror_inertia_kg_m2: 1e-8,
+            torque_constant_n_m_a: 0.01,
+            resistance_ohm: 1.0,
+            inductance_h: 1e-4,
+            torsional_mode_hz: 1e4,
+            damping_ratio: 0.01,
+            voltage_max_v: 24.0,
+            current_max_a: 10.0,
+            current_rms_a: 2.0,
+            thermal_time_s: 1.0,
+            angle_max_rad: 0.2,
+            speed_max_rad_s: 1000.0,
+            f1_uncertainty: 0.03,
+            kt_uncertainty: 0.005,
+            servo: Servo::StateFeedback {
+                velocity_weight_s: 7e-5,
+                lag_s: 1.6e-4,
+            },
+            sensor: Sensor::default(),
+        },
+        optics: Optics {
+            lens: Lens::FTheta {
+                coefficients_mm: vec![160.0],
+            },
+            first_mirror: Axis::Y,
+            field_mm: 120.0,
+        },
+        laser: Laser {
+            wavelength_nm: 1064.0,
+            beam_quality_m2: 1.1,
+            beam_diameter_mm: 10.0,
+            spot_diameter_mm: 0.03,
+            power_max_w: 20.0,
+            on_latency_ns: 0,
+            off_latency_ns: 0,
+            power_modulated: true,
+            pulse_khz: None,
+        },
+        output: Output {
+            period_ns: 10_000,
+            word_bits: 20,
+            word_range_rad: 0.218,
+            drive: Drive::ServoKnown,
+        },
+    }
+}

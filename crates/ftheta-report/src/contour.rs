@@ -1,0 +1,269 @@
+//! A mark's exact curve as a very fine polyline that finds the nearest of its points.
+
+use kurbo::{BezPath, ParamCurve, PathSeg, Point, Rect, Vec2};
+
+/// Greatest distance of the polyline from the curve, mm.
+const FLATTEN_MM: f64 = 2e-5;
+/// Segments in one leaf of the tree.
+const LEAF: usize = 8;
+/// Least arc length to either side of the expected place that is searched, mm.
+const REACH_MM: f64 = 0.75;
+/// Weight of the squared arc distance from the expected place against the squared distance. Only
+/// decides between branches that lie on each other; costs 0.1 nm of distance otherwise.
+const TIE_WEIGHT: f64 = 1e-6;
+
+/// A polyline with arc lengths and a tree of bounding boxes.
+pub struct Contour {
+    points: Vec<Point>,
+    /// Arc length up to each point, mm.
+    arc_mm: Vec<f64>,
+    /// Whether it ends where it starts; then arc positions go round.
+    closed: bool,
+    /// Bounding boxes of ranges of segments. Children of i: 2i+1, 2i+2.
+    boxes: Vec<Rect>,
+}
+
+/// A point of the curve.
+#[derive(Clone, Copy, Debug)]
+pub struct Foot {
+    /// Arc position, mm; on a closed curve below 0 or above the length where the beam went round.
+    pub at_mm: f64,
+    /// Distance of the beam from it, mm.
+    pub distance_mm: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Best {
+    cost: f64,
+    foot: Foot,
+}
+
+impl Contour {
+    /// A curve of one subpath, within 0.02 µm of the exact one.
+    pub fn new(curve: &BezPath) -> Self {
+        let points = flattened(curve);
+        let mut arc_mm = Vec::with_capacity(points.len());
+        let mut at_mm = 0.0;
+        arc_mm.push(0.0);
+        for pair in points.windows(2) {
+            at_mm += pair[0].distance(pair[1]);
+            arc_mm.push(at_mm);
+        }
+        let mut contour = Self {
+            closed: points.len() > 2 && points[0].distance(points[points.len() - 1]) < 1e-6,
+            boxes: vec![Rect::ZERO; 4 * points.len().div_ceil(LEAF).next_power_of_two()],
+            points,
+            arc_mm,
+        };
+        contour.fill_boxes();
+        contour
+    }
+
+    /// Length of the whole, mm.
+    pub fn length_mm(&self) -> f64 {
+        self.arc_mm[self.arc_mm.len() - 1]
+    }
+
+    /// Whether it ends where it starts.
+    pub fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    /// Places every `step_mm` from 0 on, in order.
+    pub fn samples(&self, step_mm: f64, n: usize) -> impl Iterator<Item = (f64, Point)> {
+        let mut i = 0;
+        (0..n).map(move |k| {
+            let at_mm = (k as f64 * step_mm).min(self.length_mm());
+            while i + 2 < self.points.len() && self.arc_mm[i + 1] < at_mm {
+                i += 1;
+            }
+            (at_mm, self.place(i, at_mm))
+        })
+    }
+
+    /// How far `beam` is outside the start: positive before it, negative past it, along the curve.
+    pub fn before_start_mm(&self, beam: Point, foot: Foot) -> f64 {
+        let along_mm = self.tangent(0).dot(self.points[0] - beam);
+        if foot.at_mm <= 0.0 && !self.closed {
+            along_mm.max(0.0)
+        } else {
+            -foot.at_mm
+        }
+    }
+
+    /// How far `beam` is past the end: positive beyond it, negative short of it, along the curve.
+    pub fn past_end_mm(&self, beam: Point, foot: Foot) -> f64 {
+        let last = self.points.len() - 1;
+        let along_mm = self.tangent(last - 1).dot(beam - self.points[last]);
+        if foot.at_mm >= self.length_mm() && !self.closed {
+            along_mm.max(0.0)
+        } else {
+            foot.at_mm - self.length_mm()
+        }
+    }
+
+    /// The point nearest to `beam` around an expected arc position.
+    ///
+    /// # Limits
+    /// Searched are 0.75 mm of arc and four times `off_mm` to either side, so that a beam stays on
+    /// its own branch where the curve crosses itself farther away along it.
+    pub fn nearest(&self, beam: Point, expected_mm: f64, off_mm: f64) -> Foot {
+        let length_mm = self.length_mm();
+        let mut reach_mm = REACH_MM + 4.0 * off_mm;
+        let mut best = Best {
+            cost: f64::INFINITY,
+            foot: Foot {
+                at_mm: 0.0,
+                distance_mm: f64::INFINITY,
+            },
+        };
+        if !self.closed {
+            let window = (expected_mm - reach_mm, expected_mm + reach_mm);
+            self.search(beam, window, 0.0, expected_mm, &mut best);
+            return best.foot;
+        }
+        reach_mm = reach_mm.min(0.5 * length_mm);
+        let turn = (expected_mm / length_mm).floor();
+        for shift in [turn, turn - 1.0, turn + 1.0] {
+            let shift_mm = shift * length_mm;
+            let lo = expected_mm - reach_mm - shift_mm;
+            let hi = expected_mm + reach_mm - shift_mm;
+            if hi >= 0.0 && lo <= length_mm {
+                self.search(beam, (lo, hi), shift_mm, expected_mm, &mut best);
+            }
+        }
+        best.foot
+    }
+
+    /// Searches the segments of a window; arc positions get `shift_mm` added.
+    fn search(
+        &self,
+        beam: Point,
+        window_mm: (f64, f64),
+        shift_mm: f64,
+        expected_mm: f64,
+        best: &mut Best,
+    ) {
+        let n = self.points.len() - 1;
+        if n == 1 {
+            self.look_at(0, beam, shift_mm, expected_mm, best);
+            return;
+        }
+        let first = self.segment_at(window_mm.0);
+        let end = self.segment_at(window_mm.1) + 1;
+        let likely = self.segment_at(expected_mm - shift_mm);
+        for i in likely.max(first)..(likely + 2).min(end) {
+            self.look_at(i, beam, shift_mm, expected_mm, best);
+        }
+        let mut stack = [(0usize, 0usize, 0usize); 64];
+        stack[0] = (0, 0, n);
+        let mut n_waiting = 1;
+        while n_waiting > 0 {
+            n_waiting -= 1;
+            let (node, lo, hi) = stack[n_waiting];
+            if hi <= first || end <= lo || distance_sq(self.boxes[node], beam) >= best.cost {
+                continue;
+            }
+            if hi - lo <= LEAF {
+                for i in lo.max(first)..hi.min(end) {
+                    self.look_at(i, beam, shift_mm, expected_mm, best);
+                }
+                continue;
+            }
+            let middle = lo + (hi - lo) / 2;
+            stack[n_waiting] = (2 * node + 1, lo, middle);
+            stack[n_waiting + 1] = (2 * node + 2, middle, hi);
+            n_waiting += 2;
+        }
+    }
+
+    fn look_at(&self, i: usize, beam: Point, shift_mm: f64, expected_mm: f64, best: &mut Best) {
+        let from = self.points[i];
+        let way = self.points[i + 1] - from;
+        let length_mm = self.arc_mm[i + 1] - self.arc_mm[i];
+        let t = ((beam - from).dot(way) / (length_mm * length_mm)).clamp(0.0, 1.0);
+        let distance_sq = (from + t * way).distance_squared(beam);
+        if distance_sq > best.cost {
+            return;
+        }
+        let at_mm = self.arc_mm[i] + t * length_mm + shift_mm;
+        let ahead_mm = at_mm - expected_mm;
+        let cost = distance_sq + TIE_WEIGHT * ahead_mm * ahead_mm;
+        if cost < best.cost {
+            *best = Best {
+                cost,
+                foot: Foot {
+                    at_mm,
+                    distance_mm: distance_sq.sqrt(),
+                },
+            };
+        }
+    }
+
+    fn segment_at(&self, at_mm: f64) -> usize {
+        let i = self.arc_mm.partition_point(|&arc_mm| arc_mm <= at_mm);
+        i.saturating_sub(1).min(self.points.len() - 2)
+    }
+
+    fn place(&self, i: usize, at_mm: f64) -> Point {
+        let length_mm = self.arc_mm[i + 1] - self.arc_mm[i];
+        let t = (at_mm - self.arc_mm[i]) / length_mm;
+        self.points[i].lerp(self.points[i + 1], t)
+    }
+
+    fn tangent(&self, i: usize) -> Vec2 {
+        (self.points[i + 1] - self.points[i]).normalize()
+    }
+
+    fn fill_boxes(&mut self) {
+        let mut todo = vec![(0, 0, self.points.len() - 1)];
+        while let Some((node, lo, hi)) = todo.pop() {
+            let first = Rect::from_points(self.points[lo], self.points[lo]);
+            let points = &self.points[lo..=hi];
+            self.boxes[node] = points.iter().fold(first, |area, &p| area.union_pt(p));
+            if hi - lo > LEAF {
+                let middle = lo + (hi - lo) / 2;
+                todo.push((2 * node + 1, lo, middle));
+                todo.push((2 * node + 2, middle, hi));
+            }
+        }
+    }
+}
+
+/// Two points or more; neighbours are apart, unless the whole curve has no length.
+fn flattened(curve: &BezPath) -> Vec<Point> {
+    let mut points: Vec<Point> = Vec::new();
+    let mut add = |p: Point| match points.last() {
+        Some(last) if last.distance(p) < 1e-9 => {}
+        _ => points.push(p),
+    };
+    for segment in curve.segments() {
+        // Steps of equal parameter h are off by at most h²/8 of the second derivative.
+        let bend_mm = match segment {
+            PathSeg::Line(_) => 0.0,
+            PathSeg::Quad(q) => 2.0 * bend(q.p0, q.p1, q.p2),
+            PathSeg::Cubic(c) => 6.0 * bend(c.p0, c.p1, c.p2).max(bend(c.p1, c.p2, c.p3)),
+        };
+        let n_steps = (bend_mm / (8.0 * FLATTEN_MM)).sqrt().ceil().max(1.0);
+        add(segment.start());
+        for step in 1..=n_steps as usize {
+            add(segment.eval(step as f64 / n_steps));
+        }
+    }
+    // A curve that is a single place still has a direction.
+    let at = points.last().copied().unwrap_or_default();
+    while points.len() < 2 {
+        points.push(at + Vec2::new(1e-9 * points.len() as f64, 0.0));
+    }
+    points
+}
+
+fn bend(a: Point, b: Point, c: Point) -> f64 {
+    (a.to_vec2() - 2.0 * b.to_vec2() + c.to_vec2()).hypot()
+}
+
+fn distance_sq(area: Rect, p: Point) -> f64 {
+    let x = (area.x0 - p.x).max(p.x - area.x1).max(0.0);
+    let y = (area.y0 - p.y).max(p.y - area.y1).max(0.0);
+    x * x + y * y
+}

@@ -1,0 +1,93 @@
+//! One mark while its light is on: nearest points, energy along the curve, the beam's path.
+
+use crate::contour::{Contour, Foot};
+use crate::coverage::BeamPath;
+use crate::line_dose::LineDose;
+use ftheta_model::plan::{PlanDraft, PlannedMark};
+use kurbo::Point;
+
+/// Finest step of arc length that curves are sampled at, mm.
+const STEP_MM: f64 = 1e-3;
+/// Most samples of one mark; longer ones than 4 m are sampled coarser.
+const N_SAMPLES_MAX: f64 = 4e6;
+
+/// What is known of a mark so far.
+pub struct MarkTrack {
+    /// Its index in the plan.
+    pub mark_index: usize,
+    /// Its curve.
+    pub contour: Contour,
+    /// Energy along it.
+    pub dose: LineDose,
+    /// Line energy that its pen asks for, J/mm.
+    pub asked_j_mm: f64,
+    path: BeamPath,
+    step_mm: f64,
+    /// Where the light came on: distance before the curve's start, mm.
+    pub before_start_mm: f64,
+    /// Where the beam is.
+    pub beam: Point,
+    /// The curve's point nearest to it.
+    pub foot: Foot,
+    /// Greatest distance so far, mm, and where the beam was.
+    pub worst: (f64, Point),
+}
+
+impl MarkTrack {
+    /// A mark whose light comes on with the beam at `beam`.
+    pub fn new(plan: &PlanDraft, mark_index: usize, mark: &PlannedMark, beam: Point) -> Self {
+        let contour = Contour::new(&mark.curve);
+        let laser = &plan.machine.laser;
+        let pen = plan.pens.get(mark.pen_index);
+        let speed_mm_s = pen.map_or(f64::INFINITY, |pen| pen.mark_speed_mm_s);
+        let pitch_mm = laser
+            .pulse_khz
+            .map_or(0.0, |pulse_khz| speed_mm_s / (1e3 * pulse_khz));
+        let window_mm = laser.spot_diameter_mm.max(2.0 * pitch_mm);
+        let step_mm = STEP_MM.max(contour.length_mm() / N_SAMPLES_MAX);
+        let start = contour.samples(0.0, 1).next();
+        let off_mm = start.map_or(0.0, |(_, start)| start.distance(beam));
+        let foot = contour.nearest(beam, 0.0, off_mm);
+        let mut path = BeamPath::default();
+        path.add(beam, foot.at_mm, 0.0);
+        Self {
+            mark_index,
+            before_start_mm: contour.before_start_mm(beam, foot),
+            dose: LineDose::new(&contour, window_mm, step_mm),
+            asked_j_mm: pen.map_or(0.0, |pen| pen.power_w) / speed_mm_s,
+            path,
+            step_mm,
+            contour,
+            beam,
+            foot,
+            worst: (foot.distance_mm, beam),
+        }
+    }
+
+    /// Moves the beam to `beam` while `energy_j` is emitted; returns the nearest point before.
+    pub fn advance(&mut self, beam: Point, energy_j: f64) -> Foot {
+        let before = self.foot;
+        let expected_mm = before.at_mm + self.beam.distance(beam);
+        self.foot = self.contour.nearest(beam, expected_mm, before.distance_mm);
+        self.beam = beam;
+        self.dose.add(before.at_mm, self.foot.at_mm, energy_j);
+        self.path.add(beam, self.foot.at_mm, self.step_mm);
+        if self.foot.distance_mm > self.worst.0 {
+            self.worst = (self.foot.distance_mm, beam);
+        }
+        before
+    }
+
+    /// How far the light went past the curve's end, mm.
+    pub fn past_end_mm(&self) -> f64 {
+        self.contour.past_end_mm(self.beam, self.foot)
+    }
+
+    /// Distances in mm of the curve's points from the lit beam.
+    pub fn coverage_mm(&mut self) -> Vec<f64> {
+        // The thinned path must still reach to where the light went off.
+        self.path.add(self.beam, self.foot.at_mm, 1e-9);
+        let n = (self.contour.length_mm() / self.step_mm).ceil() as usize + 1;
+        self.path.distances_mm(&self.contour, self.step_mm, n)
+    }
+}

@@ -1,0 +1,345 @@
+//! Traces of which the figures are known.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use ftheta_model::machine::{
+    Axis, Drive, Laser, Lens, Machine, Optics, Output, Scanner, Sensor, Servo,
+};
+use ftheta_model::plan::{PlanDraft, PlannedMark, Planner};
+use ftheta_model::recipe::Pen;
+use ftheta_model::space::FieldPoint;
+use ftheta_model::trace::{Light, Trace, TracePoint};
+use ftheta_report::score::{Score, Scorer, score};
+use kurbo::{BezPath, Circle, Point, Shape};
+
+const STEP_NS: u64 = 2000;
+
+/// A plan of curves, 10 W at 1 m/s, spot 30 µm, tolerance 10 µm.
+fn plan(curves: &[BezPath]) -> PlanDraft {
+    let marks = curves.iter().map(|curve| PlannedMark {
+        curve: curve.clone(),
+        pen_index: 0,
+        source: "#m".into(),
+        on_ns: 0,
+        off_ns: 0,
+        power_w: 10.0,
+    });
+    PlanDraft {
+        machine: machine(),
+        planner: Planner::Classic,
+        tolerance_mm: 0.01,
+        pens: vec![Pen::default()],
+        marks: marks.collect(),
+        vertices: Vec::new(),
+        segments: Vec::new(),
+    }
+}
+
+fn machine() -> Machine {
+    Machine {
+        name: "test".into(),
+        scanner: Scanner {
+            rotor_inertia_kg_m2: 1e-8,
+            mirror_inertia_kg_m2: 1e-8,
+            torque_constant_n_m_a: 0.01,
+            resistance_ohm: 1.0,
+            inductance_h: 1e-4,
+            torsional_mode_hz: 1e4,
+            damping_ratio: 0.01,
+            voltage_max_v: 24.0,
+            current_max_a: 10.0,
+            current_rms_a: 2.0,
+            thermal_time_s: 1.0,
+            angle_max_rad: 0.2,
+            speed_max_rad_s: 1000.0,
+            f1_uncertainty: 0.03,
+            kt_uncertainty: 0.005,
+            servo: Servo::StateFeedback {
+                velocity_weight_s: 7e-5,
+                lag_s: 1.6e-4,
+            },
+            sensor: Sensor::default(),
+        },
+        optics: Optics {
+            lens: Lens::FTheta {
+                coefficients_mm: vec![160.0],
+            },
+            first_mirror: Axis::Y,
+            field_mm: 120.0,
+        },
+        laser: Laser {
+            wavelength_nm: 1064.0,
+            beam_quality_m2: 1.1,
+            beam_diameter_mm: 10.0,
+            spot_diameter_mm: 0.03,
+            power_max_w: 20.0,
+            on_latency_ns: 0,
+            off_latency_ns: 0,
+            power_modulated: true,
+            pulse_khz: None,
+        },
+        output: Output {
+            period_ns: 10_000,
+            word_bits: 20,
+            word_range_rad: 0.218,
+            drive: Drive::ServoKnown,
+        },
+    }
+}
+
+fn line(x_mm: f64) -> BezPath {
+    BezPath::from_svg(&format!("M0 0 L{x_mm} 0")).unwrap()
+}
+
+/// A beam given by its place at any time in s, and light from `on_ns` to `off_ns` for each mark.
+fn trace(light_ns: &[(u64, u64)], beam: impl Fn(f64) -> Point) -> Trace {
+    let end_ns = light_ns.last().unwrap().1;
+    let points = (0..=end_ns / STEP_NS + 5).map(|i| {
+        let place = beam((i * STEP_NS) as f64 * 1e-9);
+        TracePoint::from(FieldPoint::from(place))
+    });
+    let light = light_ns.iter().enumerate();
+    Trace {
+        step_ns: STEP_NS,
+        first_index: 0,
+        points: points.collect(),
+        light: light
+            .map(|(index, &(on_ns, off_ns))| Light {
+                index,
+                on_ns,
+                off_ns,
+                power_w: 10.0,
+            })
+            .collect(),
+        states: Vec::new(),
+    }
+}
+
+#[track_caller]
+fn near(value: f64, expected: f64, off: f64) {
+    assert!((value - expected).abs() <= off, "{value} is not {expected}");
+}
+
+#[test]
+fn a_perfect_line_has_no_errors() {
+    // Light comes on 1 ms after the start and between two points.
+    let beam = |t: f64| Point::new(1000.0 * (t - 1.0007e-3), 0.0);
+    let found = score(
+        &plan(&[line(10.0)]),
+        &trace(&[(1_000_700, 11_000_700)], beam),
+    );
+    near(found.contour_error_um.max, 0.0, 1e-6);
+    near(found.coverage_error_um.max, 0.0, 0.002);
+    near(found.end_error_um.max, 0.0, 0.002);
+    let dose = found.dose_ratio.unwrap();
+    near(dose.min, 1.0, 1e-4);
+    near(dose.max, 1.0, 1e-4);
+    near(found.duration_s, 0.01, 1e-12);
+    near(found.energy_j, 0.1, 1e-12);
+    assert_eq!(found.stray_energy_ratio, 0.0);
+    assert_eq!(found.dose_bars.iter().sum::<f64>(), 1.0);
+}
+
+#[test]
+fn an_offset_is_the_contour_and_the_coverage_error() {
+    let beam = |t: f64| Point::new(1000.0 * t, 0.007);
+    let found = score(&plan(&[line(10.0)]), &trace(&[(0, 10_000_000)], beam));
+    near(found.contour_error_um.max, 7.0, 1e-9);
+    near(found.contour_error_um.p99, 7.0, 0.04);
+    near(found.contour_error_um.rms, 7.0, 1e-9);
+    near(found.coverage_error_um.max, 7.0, 1e-3);
+    near(found.coverage_error_um.p99, 7.0, 0.04);
+    near(found.end_error_um.max, 0.0, 1e-6);
+    assert_eq!(found.stray_energy_ratio, 0.0);
+    assert!(
+        found
+            .error_samples
+            .iter()
+            .all(|s| (s.error_um - 7.0).abs() < 1e-6)
+    );
+    near(found.worst_marks[0].error_um, 7.0, 1e-9);
+}
+
+#[test]
+fn energy_beyond_the_tolerance_is_stray() {
+    // Drifts from 5 µm to 15 µm: beyond 10 µm in the second half.
+    let beam = |t: f64| Point::new(1000.0 * t, 0.005 + t);
+    let found = score(&plan(&[line(10.0)]), &trace(&[(0, 10_000_000)], beam));
+    near(found.stray_energy_ratio, 0.5, 1e-3);
+    near(found.contour_error_um.max, 15.0, 1e-6);
+    near(found.contour_error_um.p99, 14.9, 0.1);
+    let exact_rms = ((15f64.powi(3) - 5f64.powi(3)) / 30.0).sqrt();
+    near(found.contour_error_um.rms, exact_rms, 1e-3);
+}
+
+#[test]
+fn light_outside_any_mark_is_stray() {
+    let beam = |t: f64| Point::new(1000.0 * t, 0.0);
+    let light = [(0, 10_000_000), (10_000_000, 20_000_000)];
+    let found = score(&plan(&[line(10.0)]), &trace(&light, beam));
+    near(found.stray_energy_ratio, 0.5, 1e-12);
+    near(found.duration_s, 0.02, 1e-12);
+}
+
+#[test]
+fn a_mark_that_ends_short_is_not_covered() {
+    let beam = |t: f64| Point::new(1000.0 * t, 0.0);
+    let found = score(&plan(&[line(10.0)]), &trace(&[(0, 9_980_000)], beam));
+    near(found.end_error_um.max, 20.0, 1e-3);
+    near(found.coverage_error_um.max, 20.0, 1e-3);
+    near(found.contour_error_um.max, 0.0, 1e-9);
+    near(found.dose_ratio.unwrap().min, 1.0 / 3.0, 0.01);
+}
+
+#[test]
+fn light_before_the_start_is_too_long() {
+    let beam = |t: f64| Point::new(1000.0 * t - 0.05, 0.0);
+    let found = score(&plan(&[line(10.0)]), &trace(&[(0, 10_050_000)], beam));
+    near(found.end_error_um.max, 50.0, 1e-6);
+    near(found.contour_error_um.max, 50.0, 1e-6);
+    near(found.coverage_error_um.max, 0.0, 1e-3);
+}
+
+#[test]
+fn half_the_speed_is_twice_the_dose() {
+    let beam = |t: f64| {
+        let x = match t {
+            t if t < 3e-3 => 1000.0 * t,
+            t if t < 9e-3 => 3.0 + 500.0 * (t - 3e-3),
+            t => 6.0 + 1000.0 * (t - 9e-3),
+        };
+        Point::new(x, 0.0)
+    };
+    let found = score(&plan(&[line(9.0)]), &trace(&[(0, 12_000_000)], beam));
+    let dose = found.dose_ratio.unwrap();
+    near(dose.min, 1.0, 1e-3);
+    near(dose.max, 2.0, 1e-3);
+    near(dose.p99, 2.0, 3e-3);
+    near(found.dose_bars[40], 1.0 / 3.0, 0.2);
+}
+
+#[test]
+fn a_circle_is_followed_all_the_way_round() {
+    let radius_mm = 2.0;
+    let beam = |t: f64| {
+        let angle = 1000.0 * t / radius_mm;
+        Point::new(
+            1.005 * radius_mm * angle.cos(),
+            1.005 * radius_mm * angle.sin(),
+        )
+    };
+    // 100 µm more than once round.
+    let turn_ns = (2.0 * std::f64::consts::PI * radius_mm * 1e6) as u64;
+    let circle = Circle::new(Point::ZERO, radius_mm).to_path(1e-7);
+    let mut curve = BezPath::from_vec(circle.elements()[..circle.elements().len() - 1].to_vec());
+    curve.line_to((radius_mm, 0.0));
+    let found = score(&plan(&[curve]), &trace(&[(0, turn_ns + 100_000)], beam));
+    near(found.contour_error_um.max, 10.0, 0.05);
+    near(found.contour_error_um.rms, 10.0, 0.05);
+    near(found.coverage_error_um.max, 10.0, 0.05);
+    near(found.end_error_um.max, 100.0, 0.1);
+    let dose = found.dose_ratio.unwrap();
+    near(dose.p01, 1.0, 3e-3);
+    near(dose.max, 2.0, 0.01);
+}
+
+#[test]
+fn a_retraced_line_stays_on_its_branch() {
+    let curve = BezPath::from_svg("M0 0 L5 0 L0 0").unwrap();
+    let beam = |t: f64| Point::new((1000.0 * t).min(10.0 - 1000.0 * t), 0.0);
+    let found = score(&plan(&[curve]), &trace(&[(0, 10_000_000)], beam));
+    near(found.contour_error_um.max, 0.0, 1e-6);
+    near(found.end_error_um.max, 0.0, 1e-6);
+    let dose = found.dose_ratio.unwrap();
+    near(dose.min, 1.0, 0.07);
+    near(dose.max, 1.0, 0.07);
+}
+
+#[test]
+fn a_cut_corner_is_not_covered() {
+    // Cuts 0.1 mm off both legs of a right angle.
+    let curve = BezPath::from_svg("M0 0 L5 0 L5 5").unwrap();
+    let beam = |t: f64| {
+        let way = 1000.0 * t;
+        let cut = 0.1 * 2f64.sqrt();
+        match way {
+            w if w < 4.9 => Point::new(w, 0.0),
+            w if w < 4.9 + cut => {
+                let share = (w - 4.9) / cut;
+                Point::new(4.9 + 0.1 * share, 0.1 * share)
+            }
+            w => Point::new(5.0, 0.1 + w - 4.9 - cut),
+        }
+    };
+    let end_ns = ((9.8 + 0.1 * 2f64.sqrt()) * 1e6) as u64;
+    let found = score(&plan(&[curve]), &trace(&[(0, end_ns)], beam));
+    near(found.contour_error_um.max, 50.0, 0.75);
+    near(found.coverage_error_um.max, 50.0 * 2f64.sqrt(), 0.1);
+    near(found.end_error_um.max, 0.0, 0.01);
+}
+
+#[test]
+fn an_unlit_mark_is_missed() {
+    let beam = |t: f64| Point::new(1000.0 * t, 0.0);
+    let found = score(
+        &plan(&[line(10.0), line(3.0)]),
+        &trace(&[(0, 10_000_000)], beam),
+    );
+    assert_eq!(found.n_unlit_marks, 1);
+    near(found.coverage_error_um.max, 3000.0, 1e-6);
+}
+
+#[test]
+fn chunks_are_as_good_as_the_whole() {
+    let beam = |t: f64| Point::new(1000.0 * t, 0.004 * (700.0 * t).sin());
+    let light = [
+        (700, 3_000_100),
+        (3_500_000, 9_000_300),
+        (9_100_000, 12_000_000),
+    ];
+    let curve = |a: f64, b: f64| BezPath::from_svg(&format!("M{a} 0 L{b} 0")).unwrap();
+    let plan = plan(&[curve(0.0, 3.0), curve(3.5, 9.0), curve(9.1, 12.0)]);
+    let whole = trace(&light, beam);
+    let expected = score(&plan, &whole);
+    for n in [1, 7, 100, 2500] {
+        let mut scorer = Scorer::new(&plan);
+        for (i, points) in whole.points.chunks(n).enumerate() {
+            scorer.add(&chunk(&whole, i * n, points));
+        }
+        let found: Score = scorer.finish();
+        near(
+            found.contour_error_um.rms,
+            expected.contour_error_um.rms,
+            1e-9,
+        );
+        near(found.duration_s, expected.duration_s, 1e-12);
+        near(found.energy_j, expected.energy_j, 1e-12);
+        assert_eq!(found.contour_error_um.max, expected.contour_error_um.max);
+        assert_eq!(found.coverage_error_um, expected.coverage_error_um);
+        assert_eq!(found.end_error_um, expected.end_error_um);
+        let (a, b) = (found.dose_ratio.unwrap(), expected.dose_ratio.unwrap());
+        near(a.min, b.min, 1e-9);
+        near(a.max, b.max, 1e-9);
+    }
+}
+
+/// The light that ends in a chunk or is cut at its last point.
+fn chunk(whole: &Trace, first: usize, points: &[TracePoint]) -> Trace {
+    let start_ns = (first as u64).saturating_sub(1) * STEP_NS;
+    let end_ns = (first + points.len() - 1) as u64 * STEP_NS;
+    let light = whole.light.iter().filter_map(|light| {
+        let cut = Light {
+            on_ns: light.on_ns.max(start_ns),
+            off_ns: light.off_ns.min(end_ns),
+            ..*light
+        };
+        (cut.on_ns < cut.off_ns).then_some(cut)
+    });
+    Trace {
+        step_ns: STEP_NS,
+        first_index: first as u64,
+        points: points.to_vec(),
+        light: light.collect(),
+        states: Vec::new(),
+    }
+}

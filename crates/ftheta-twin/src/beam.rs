@@ -1,0 +1,166 @@
+//! The two axes between ticks: exact states at sub-steps from one transition each.
+
+use crate::mismatch::Mismatch;
+use ftheta_model::machine::{Machine, Sensor};
+use ftheta_model::space::{FieldPoint, MirrorAngles};
+use ftheta_model::trace::AxisStates;
+use ftheta_physics::axis_loop::AxisLoop;
+use ftheta_physics::galvo::{CURRENT, Galvo, State};
+use ftheta_physics::map_table::MapTable;
+use ftheta_physics::optics::field_from_angles;
+use ftheta_physics::servo::{Gains, ServoError};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+
+/// Longest time between points of the trace, ns.
+const STEP_MAX_NS: u32 = 2000;
+
+/// Two axes, their sensors, and the optics behind them.
+pub struct Beam {
+    axes: [AxisLoop; 2],
+    /// Mirror angle at each sub-step of a tick from the states at its start and the voltage.
+    substeps: Vec<(State, f64)>,
+    speed_row: State,
+    table: Option<MapTable>,
+    machine: Machine,
+    random: Xoshiro256PlusPlus,
+    tick_s: f64,
+    n_ticks: u64,
+    angles: [f64; 2],
+    voltages: [f64; 2],
+}
+
+impl Beam {
+    /// Both axes at rest in the centre.
+    ///
+    /// # Errors
+    /// If the machine's servo cannot be built.
+    pub fn new(machine: &Machine, mismatch: &Mismatch, seed: u64) -> Result<Self, ServoError> {
+        let scanner = &machine.scanner;
+        let tick_s = machine.output.period_s();
+        let nominal = Galvo::new(scanner);
+        // The driver was tuned on the nominal axis and does not know of the mismatch.
+        let gains = Gains::design(scanner, tick_s)?;
+        let plant = mismatch.apply(&nominal);
+        let axis = AxisLoop::new(&plant, gains, scanner, tick_s);
+        let n_substeps = substeps(machine.output.period_ns);
+        let row = plant.mirror_row();
+        let substeps = (1..=n_substeps)
+            .map(|index| {
+                let step = plant.step(tick_s * f64::from(index) / f64::from(n_substeps));
+                (step.a.transpose() * row, row.dot(&step.b))
+            })
+            .collect();
+        // A little further than the limit, where an overshoot may go.
+        let reach_rad = 1.1 * scanner.angle_max_rad;
+        let table = MapTable::new(reach_rad, 0.0, |x, y| {
+            let place = field_from_angles(&machine.optics, MirrorAngles::new(x, y));
+            Some([place.x_mm, place.y_mm])
+        });
+        Ok(Self {
+            axes: [axis.clone(), axis],
+            substeps,
+            speed_row: plant.mirror_speed_row(),
+            table,
+            machine: machine.clone(),
+            random: Xoshiro256PlusPlus::seed_from_u64(seed),
+            tick_s,
+            n_ticks: 0,
+            angles: [0.0; 2],
+            voltages: [0.0; 2],
+        })
+    }
+
+    /// Number of trace points per tick.
+    pub fn n_substeps(&self) -> usize {
+        self.substeps.len()
+    }
+
+    /// Plays one tick with these commanded angles, calls `visit` with the beam's place at each
+    /// sub-step after its start.
+    #[inline]
+    pub fn tick(&mut self, command: [f64; 2], mut visit: impl FnMut(FieldPoint)) {
+        let before = [*self.axes[0].state(), *self.axes[1].state()];
+        for (axis, &reference_rad) in command.iter().enumerate() {
+            let error_rad = self.sensor_error(axis);
+            self.voltages[axis] = self.axes[axis].tick(reference_rad, error_rad);
+        }
+        self.n_ticks += 1;
+        for index in 0..self.substeps.len() {
+            let (row, per_volt) = &self.substeps[index];
+            self.angles =
+                [0, 1].map(|axis| row.dot(&before[axis]) + per_volt * self.voltages[axis]);
+            visit(self.place());
+        }
+    }
+
+    /// Where the beam is, in the field.
+    #[inline]
+    fn place(&self) -> FieldPoint {
+        let [x_rad, y_rad] = self.angles;
+        match self
+            .table
+            .as_ref()
+            .and_then(|table| table.value(x_rad, y_rad))
+        {
+            Some([x_mm, y_mm]) => FieldPoint::new(x_mm, y_mm),
+            None => field_from_angles(&self.machine.optics, MirrorAngles::new(x_rad, y_rad)),
+        }
+    }
+
+    /// What the axes do now.
+    pub fn states(&self, time_ns: u64) -> AxisStates {
+        let states = [self.axes[0].state(), self.axes[1].state()];
+        AxisStates {
+            time_ns,
+            angle_rad: self.angles,
+            speed_rad_s: states.map(|state| self.speed_row.dot(state)),
+            current_a: states.map(|state| state[CURRENT]),
+            voltage_v: self.voltages,
+        }
+    }
+
+    fn sensor_error(&mut self, axis: usize) -> f64 {
+        let Sensor {
+            gain_error,
+            nonlinearity,
+            drift_rad_s,
+            noise_rad,
+        } = self.machine.scanner.sensor;
+        let mut error_rad = 0.0;
+        if gain_error != 0.0 || nonlinearity != 0.0 {
+            let angle_rad = self.axes[axis].rotor_rad();
+            let share = angle_rad / self.machine.scanner.angle_max_rad;
+            error_rad += angle_rad * (gain_error + nonlinearity * share * share);
+        }
+        if drift_rad_s != 0.0 {
+            error_rad += drift_rad_s * self.n_ticks as f64 * self.tick_s;
+        }
+        if noise_rad != 0.0 {
+            let normal: f64 = StandardNormal.sample(&mut self.random);
+            error_rad += noise_rad * normal;
+        }
+        error_rad
+    }
+}
+
+/// Fewest sub-steps of a whole number of nanoseconds that are short enough.
+fn substeps(period_ns: u32) -> u32 {
+    let fewest = period_ns.div_ceil(STEP_MAX_NS);
+    (fewest..=period_ns)
+        .find(|&n| period_ns.is_multiple_of(n))
+        .unwrap_or(period_ns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::substeps;
+
+    #[test]
+    fn substeps_are_short_and_whole() {
+        for (period_ns, expected) in [(10_000, 5), (1_000, 1), (2_500, 2), (100_000, 50)] {
+            assert_eq!(substeps(period_ns), expected);
+        }
+    }
+}

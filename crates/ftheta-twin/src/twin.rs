@@ -1,0 +1,168 @@
+//! The twin: a sink for blocks that keeps what the beam did.
+
+use crate::beam::Beam;
+use crate::exposure::Exposure;
+use crate::light::LaserState;
+use crate::mismatch::Mismatch;
+use ftheta_model::block::{Block, SampleSink};
+use ftheta_model::dose::DoseMap;
+use ftheta_model::machine::Machine;
+use ftheta_model::space::FieldPoint;
+use ftheta_model::trace::{Trace, TracePoint};
+use ftheta_physics::servo::ServoError;
+use thiserror::Error;
+
+/// What the twin is told beside the machine file.
+#[derive(Clone, Copy, Debug)]
+pub struct TwinOptions {
+    /// How its plant differs.
+    pub mismatch: Mismatch,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Side of a pixel of the dose map, mm.
+    pub pixel_mm: f64,
+    /// The states of every n-th tick are kept.
+    pub state_stride: u64,
+}
+
+/// Why the twin does not go on.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum TwinError {
+    /// A block is missing or out of order.
+    #[error("block starts at sample {found}, expected {expected}")]
+    Gap {
+        /// Index of the block's first sample.
+        found: u64,
+        /// Index that follows on.
+        expected: u64,
+    },
+}
+
+/// A machine in the computer.
+pub struct Twin {
+    beam: Beam,
+    laser: LaserState,
+    exposure: Exposure,
+    trace: Trace,
+    last: FieldPoint,
+    state_stride: u64,
+    spot_diameter_mm: f64,
+    rad_per_word: f64,
+    period_ns: u64,
+    next_index: u64,
+}
+
+impl Twin {
+    /// A machine at rest, beam in the centre, laser off.
+    ///
+    /// # Errors
+    /// If the machine's servo cannot be built.
+    pub fn new(machine: &Machine, options: &TwinOptions) -> Result<Self, ServoError> {
+        let beam = Beam::new(machine, &options.mismatch, options.seed)?;
+        let period_ns = u64::from(machine.output.period_ns);
+        let trace = Trace {
+            step_ns: period_ns / beam.n_substeps() as u64,
+            ..Trace::default()
+        };
+        Ok(Self {
+            beam,
+            laser: LaserState::new(machine.laser.on_latency_ns, machine.laser.off_latency_ns),
+            exposure: Exposure::new(options.pixel_mm),
+            trace: Trace {
+                points: vec![TracePoint::default()],
+                ..trace
+            },
+            last: FieldPoint::default(),
+            state_stride: options.state_stride.max(1),
+            spot_diameter_mm: machine.laser.spot_diameter_mm,
+            rad_per_word: machine.output.word_step_rad(),
+            period_ns,
+            next_index: 0,
+        })
+    }
+
+    /// What has happened since the last call. The first point of a stretch is the last one of
+    /// the stretch before; light that goes on is cut at the end of the stretch.
+    pub fn take_trace(&mut self) -> Trace {
+        let now_ns = self.next_index * self.period_ns;
+        self.trace.light.extend(self.laser.cut(now_ns));
+        let last_point = self.trace.points[self.trace.points.len() - 1];
+        let next = Trace {
+            step_ns: self.trace.step_ns,
+            first_index: self.next_index * self.beam.n_substeps() as u64,
+            points: vec![last_point],
+            ..Trace::default()
+        };
+        std::mem::replace(&mut self.trace, next)
+    }
+
+    /// The energy on the work plane after everything that was played.
+    pub fn into_dose(self) -> DoseMap {
+        self.exposure.blurred(self.spot_diameter_mm)
+    }
+
+    /// Spreads energy over a sub-step in which light may change.
+    fn expose(&mut self, from_ns: u64, from: FieldPoint, to: FieldPoint) {
+        let end_ns = from_ns + self.trace.step_ns;
+        let mut now_ns = from_ns;
+        loop {
+            let until_ns = self.laser.next_ns().min(end_ns);
+            let power_w = self.laser.power_w();
+            if power_w > 0.0 && until_ns > now_ns {
+                let middle_ns = 0.5 * (now_ns + until_ns) as f64 - from_ns as f64;
+                let share = middle_ns / self.trace.step_ns as f64;
+                let place = FieldPoint::new(
+                    from.x_mm + share * (to.x_mm - from.x_mm),
+                    from.y_mm + share * (to.y_mm - from.y_mm),
+                );
+                self.exposure
+                    .add(place, power_w * (until_ns - now_ns) as f64 * 1e-9);
+            }
+            if until_ns == end_ns {
+                return;
+            }
+            now_ns = until_ns.max(now_ns);
+            self.trace.light.extend(self.laser.change());
+        }
+    }
+}
+
+impl SampleSink for Twin {
+    type Error = TwinError;
+
+    fn push(&mut self, block: &Block) -> Result<(), TwinError> {
+        if block.first_index != self.next_index {
+            return Err(TwinError::Gap {
+                found: block.first_index,
+                expected: self.next_index,
+            });
+        }
+        block.edges.iter().for_each(|&edge| self.laser.take(edge));
+        let mut places = [FieldPoint::default(); 100];
+        let n_substeps = self.beam.n_substeps();
+        for word in &block.words {
+            let command = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
+            let mut n_visited = 0;
+            self.beam.tick(command, |place| {
+                places[n_visited] = place;
+                n_visited += 1;
+            });
+            let mut now_ns = self.next_index * self.period_ns;
+            for &place in &places[..n_substeps] {
+                let end_ns = now_ns + self.trace.step_ns;
+                if self.laser.power_w() > 0.0 || self.laser.next_ns() < end_ns {
+                    self.expose(now_ns, self.last, place);
+                }
+                self.trace.points.push(place.into());
+                self.last = place;
+                now_ns = end_ns;
+            }
+            self.next_index += 1;
+            if self.next_index.is_multiple_of(self.state_stride) {
+                self.trace.states.push(self.beam.states(now_ns));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,171 @@
+//! Everything that can go wrong between a file and a marked field.
+
+use ftheta_formats::plan_file::PlanFileError;
+use ftheta_formats::svg::error::SvgError;
+use ftheta_formats::toml_table::TomlError;
+use ftheta_physics::audit::AuditError;
+use ftheta_physics::servo::ServoError;
+use ftheta_planner::PlanError;
+use ftheta_toolpath::error::LayError;
+use ftheta_twin::twin::TwinError;
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Everything that can go wrong between a file and a marked field.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or folder cannot be read or written.
+    #[error("{path}: cannot {action}: {source}", path = path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A file is larger than is read.
+    #[error("{path}: {n_bytes} bytes are more than the limit of {limit} bytes", path = path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        n_bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// No reader for a kind of file.
+    #[error("{path}: unknown kind of file, expected {expected}", path = path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What can be read.
+        expected: &'static str,
+    },
+    /// Neither a preset nor a file.
+    #[error("machine \"{name}\" is neither a preset nor a file; presets are {presets}")]
+    NoMachine {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        presets: String,
+    },
+    /// A drawing is at fault.
+    #[error("{path}: {source}", path = path.display())]
+    Svg {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: SvgError,
+    },
+    /// A machine or recipe file is at fault.
+    #[error(transparent)]
+    Toml(#[from] TomlError),
+    /// A plan file is at fault.
+    #[error("{path}: {source}", path = path.display())]
+    PlanFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: PlanFileError,
+    },
+    /// A plan file does not hold what its id stands for.
+    #[error("{path}: its content has the id {found}, the file says {claimed}", path = path.display())]
+    PlanId {
+        /// The file.
+        path: PathBuf,
+        /// Hash of the content.
+        found: String,
+        /// Id in the file.
+        claimed: String,
+    },
+    /// The job does not fit the field, or cannot be laid.
+    #[error(transparent)]
+    Lay(#[from] LayError),
+    /// The toolpath cannot be planned.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The plan is refused.
+    #[error(transparent)]
+    Audit(#[from] AuditError),
+    /// The machine's servo cannot be built.
+    #[error(transparent)]
+    Servo(#[from] ServoError),
+    /// The twin does not go on.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// The report cannot be made.
+    #[error("the picture cannot be made: {0}")]
+    Picture(String),
+}
+
+/// An error in parts, for programs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Fault {
+    /// One sentence.
+    pub message: String,
+    /// File, line, element, mark or key.
+    pub place: String,
+    /// What was found there.
+    pub value: String,
+    /// What is allowed.
+    pub limit: String,
+}
+
+impl Error {
+    /// The error in parts.
+    pub fn fault(&self) -> Fault {
+        let (place, value, limit) = match self {
+            Self::Io { path, source, .. } => (
+                path.display().to_string(),
+                source.to_string(),
+                String::new(),
+            ),
+            Self::TooLarge {
+                path,
+                n_bytes,
+                limit,
+            } => (
+                path.display().to_string(),
+                format!("{n_bytes} bytes"),
+                format!("{limit} bytes"),
+            ),
+            Self::Format { path, expected } => (
+                path.display().to_string(),
+                "unknown kind of file".into(),
+                (*expected).into(),
+            ),
+            Self::NoMachine { name, presets } => {
+                ("--machine".into(), name.clone(), presets.clone())
+            }
+            Self::Svg { path, source } => {
+                let (place, value, limit) = source.fault();
+                (format!("{}: {place}", path.display()), value, limit)
+            }
+            Self::Toml(error) => error.fault(),
+            Self::PlanFile { path, source } => {
+                let (place, value, limit) = source.fault();
+                (format!("{}: {place}", path.display()), value, limit)
+            }
+            Self::PlanId {
+                path,
+                found,
+                claimed,
+            } => (path.display().to_string(), found.clone(), claimed.clone()),
+            Self::Lay(error) => error.fault(),
+            Self::Plan(error) => error.fault(),
+            Self::Audit(error) => error.fault(),
+            Self::Servo(error) => ("scanner.servo".into(), error.to_string(), String::new()),
+            Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),
+            Self::Picture(message) => ("mark.png".into(), message.clone(), String::new()),
+        };
+        Fault {
+            message: self.to_string(),
+            place,
+            value,
+            limit,
+        }
+    }
+}

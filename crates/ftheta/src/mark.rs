@@ -1,0 +1,282 @@
+//! The main job: a job laid, planned, audited, played on the twin and scored.
+
+use crate::Error;
+use ftheta_model::block::{Block, SampleSink};
+use ftheta_model::dose::DoseMap;
+use ftheta_model::job::Job;
+use ftheta_model::machine::Machine;
+use ftheta_model::plan::{Motion, PlanDraft};
+use ftheta_model::recipe::Recipe;
+use ftheta_model::trace::AxisStates;
+use ftheta_model::warning::{Imported, Warning};
+use ftheta_physics::plan::Plan;
+use ftheta_planner::classic::{self, Settings};
+use ftheta_planner::render::Renderer;
+use ftheta_report::score::{Score, Scorer};
+use ftheta_toolpath::lay::{LayOptions, Order, lay};
+use ftheta_twin::mismatch::Mismatch;
+use ftheta_twin::twin::{Twin, TwinOptions};
+
+/// How a job is marked.
+#[derive(Clone, Debug)]
+pub struct MarkOptions {
+    /// Speed of all pens, mm/s; `None` leaves the pens' own.
+    pub speed_mm_s: Option<f64>,
+    /// Greatest distance of the beam from a mark, mm.
+    pub tolerance_mm: f64,
+    /// Order of the marks.
+    pub order: Order,
+    /// Marks what fits of shapes that leave the field.
+    pub clip: bool,
+    /// How the twin's plant differs from the machine.
+    pub mismatch: Mismatch,
+    /// Noise of the position sensors, mm rms in the field, added to the machine file's.
+    pub noise_mm: f64,
+    /// Seed of all noise.
+    pub seed: u64,
+}
+
+impl Default for MarkOptions {
+    /// Pens' own speed, 10 µm, shortest order, no clipping, no mismatch, no noise, seed 1.
+    fn default() -> Self {
+        Self {
+            speed_mm_s: None,
+            tolerance_mm: 0.010,
+            order: Order::Shortest,
+            clip: false,
+            mismatch: Mismatch::default(),
+            noise_mm: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+/// What came of a job.
+pub struct Marked {
+    /// The plan that was played.
+    pub plan: Plan,
+    /// The planner's constants.
+    pub settings: Settings,
+    /// Where the plan's time goes.
+    pub times: PlanTimes,
+    /// What the beam did on the twin.
+    pub score: Score,
+    /// The energy on the work plane.
+    pub dose: DoseMap,
+    /// States of the axes over time, thinned.
+    pub states: Vec<AxisStates>,
+    /// Seed of the twin's noise.
+    pub seed: u64,
+    /// What was ignored or changed.
+    pub warnings: Vec<Warning>,
+}
+
+/// Where the time of a plan goes, on its own clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlanTimes {
+    /// First light to last light, s.
+    pub duration_s: f64,
+    /// Light, s.
+    pub mark_s: f64,
+    /// Darkness between first and last light, s.
+    pub jump_s: f64,
+    /// The part of `jump_s` in which the command stands still, s.
+    pub delay_s: f64,
+    /// Jumps between marks.
+    pub n_jumps: usize,
+    /// Length of all marks, mm.
+    pub marked_mm: f64,
+}
+
+/// A stage of [`mark`], told to its observer when it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stage {
+    /// Shapes become vectors in order.
+    Lay,
+    /// Vectors become motion.
+    Plan,
+    /// Every sample of the plan is checked.
+    Audit,
+    /// The twin plays; the share of the samples done.
+    Play(f64),
+    /// Dose map and figures are finished.
+    Finish,
+}
+
+/// States of the axes that are kept, about.
+const N_STATES: u64 = 100_000;
+
+/// Most pixels of the dose map's bounding box.
+const N_PIXELS_MAX: f64 = 24e6;
+
+/// Blocks between two looks at the trace.
+const N_BLOCKS_PER_STRETCH: usize = 32;
+
+/// Marks a job on the digital twin.
+///
+/// * `observer` is told when a stage begins, so that a front end can show progress and time it
+///
+/// # Errors
+/// If the job leaves the field, a setting is out of the machine's range, or the audit refuses.
+pub fn mark(
+    job: &Job,
+    machine: &Machine,
+    recipe: &Recipe,
+    options: &MarkOptions,
+    observer: &mut dyn FnMut(Stage),
+) -> Result<Marked, Error> {
+    observer(Stage::Lay);
+    let lay_options = LayOptions {
+        flatten_tolerance_mm: recipe.flatten_tolerance_mm.unwrap_or(0.002),
+        order: options.order,
+        half_field_mm: 0.5 * machine.optics.field_mm,
+        clip: options.clip,
+        ..LayOptions::default()
+    };
+    let Imported {
+        value: mut toolpath,
+        warnings,
+    } = lay(job, &lay_options)?;
+    if let Some(speed_mm_s) = options.speed_mm_s {
+        toolpath
+            .pens
+            .iter_mut()
+            .for_each(|pen| pen.mark_speed_mm_s = speed_mm_s);
+    }
+    observer(Stage::Plan);
+    let settings = Settings::new(machine, &recipe.classic)?;
+    let draft = classic::draft(toolpath, machine, &settings, options.tolerance_mm)?;
+    observer(Stage::Audit);
+    let plan = Plan::new(draft)?;
+    let Played {
+        score,
+        dose,
+        states,
+    } = play(&plan, options, observer)?;
+    let times = plan_times(&plan);
+    let seed = options.seed;
+    Ok(Marked {
+        plan,
+        settings,
+        times,
+        score,
+        dose,
+        states,
+        seed,
+        warnings,
+    })
+}
+
+/// What the twin did with a plan.
+pub struct Played {
+    /// The figures.
+    pub score: Score,
+    /// The energy on the work plane.
+    pub dose: DoseMap,
+    /// States of the axes over time, thinned.
+    pub states: Vec<AxisStates>,
+}
+
+/// Plays a plan on the twin; memory does not grow with the plan, except for what is returned.
+///
+/// # Errors
+/// If the machine's servo cannot be built.
+pub fn play(
+    plan: &Plan,
+    options: &MarkOptions,
+    observer: &mut dyn FnMut(Stage),
+) -> Result<Played, Error> {
+    let n_samples = plan.n_samples();
+    let twin_options = TwinOptions {
+        mismatch: options.mismatch,
+        seed: options.seed,
+        pixel_mm: pixel_mm(plan),
+        state_stride: n_samples.div_ceil(N_STATES),
+    };
+    let mut machine = plan.machine.clone();
+    // A displacement in the field is half that of the beam's angle times the focal length.
+    machine.scanner.sensor.noise_rad = machine
+        .scanner
+        .sensor
+        .noise_rad
+        .hypot(options.noise_mm / ftheta_physics::optics::scale_mm_per_rad(&machine.optics));
+    let mut twin = Twin::new(&machine, &twin_options)?;
+    let mut renderer = Renderer::new(plan);
+    let mut scorer = Scorer::new(plan);
+    let mut states = Vec::new();
+    let mut block = Block::default();
+    let mut n_blocks = 0;
+    while renderer.next_block(&mut block) {
+        if n_blocks % N_BLOCKS_PER_STRETCH == 0 {
+            observer(Stage::Play(block.first_index as f64 / n_samples as f64));
+            let mut trace = twin.take_trace();
+            scorer.add(&trace);
+            states.append(&mut trace.states);
+        }
+        n_blocks += 1;
+        twin.push(&block)?;
+    }
+    let mut trace = twin.take_trace();
+    scorer.add(&trace);
+    states.append(&mut trace.states);
+    observer(Stage::Finish);
+    Ok(Played {
+        score: scorer.finish(),
+        dose: twin.into_dose(),
+        states,
+    })
+}
+
+/// A third of the spot, or coarser where the drawing is so large that memory would not do.
+fn pixel_mm(plan: &PlanDraft) -> f64 {
+    let (mut low, mut high) = (kurbo::Point::ZERO, kurbo::Point::ZERO);
+    for (index, &vertex) in plan.vertices.iter().enumerate() {
+        // The first and last vertices are the field centre.
+        if index != 0 && index + 1 != plan.vertices.len() {
+            low = kurbo::Point::new(low.x.min(vertex.x), low.y.min(vertex.y));
+            high = kurbo::Point::new(high.x.max(vertex.x), high.y.max(vertex.y));
+        }
+    }
+    let area_mm2 = (high.x - low.x) * (high.y - low.y);
+    (plan.machine.laser.spot_diameter_mm / 3.0).max((area_mm2 / N_PIXELS_MAX).sqrt())
+}
+
+/// Where the time of a plan goes.
+pub fn plan_times(plan: &PlanDraft) -> PlanTimes {
+    let (Some(first), Some(last)) = (plan.marks.first(), plan.marks.last()) else {
+        return PlanTimes::default();
+    };
+    let laser = &plan.machine.laser;
+    let latency_ns = laser.off_latency_ns - laser.on_latency_ns;
+    let seconds =
+        |from_ns: u64, to_ns: u64| ((to_ns as i64 - from_ns as i64) + latency_ns) as f64 * 1e-9;
+    let mut times = PlanTimes {
+        duration_s: seconds(first.on_ns, last.off_ns),
+        mark_s: plan
+            .marks
+            .iter()
+            .map(|mark| seconds(mark.on_ns, mark.off_ns).max(0.0))
+            .sum(),
+        ..PlanTimes::default()
+    };
+    times.jump_s = times.duration_s - times.mark_s;
+    let last_mark = plan.marks.len() as u32 - 1;
+    let mut mark_before = None;
+    for segment in &plan.segments {
+        let between = mark_before.is_some_and(|mark| mark < last_mark);
+        match (segment.mark_index, segment.motion) {
+            (Some(index), motion) => {
+                mark_before = Some(index);
+                if let Motion::Travel { profile, .. } = motion {
+                    times.marked_mm += profile.length_mm;
+                }
+            }
+            (None, Motion::Travel { .. }) => times.n_jumps += usize::from(between),
+            (None, Motion::Hold { .. }) if between => {
+                times.delay_s += f64::from(segment.n_ticks) * plan.machine.output.period_s();
+            }
+            (None, Motion::Hold { .. }) => {}
+        }
+    }
+    times
+}
