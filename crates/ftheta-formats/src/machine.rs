@@ -31,7 +31,7 @@ pub fn read(file: &str, text: &str) -> Result<Machine, TomlError> {
         let laser = root
             .section("laser", |section| laser(section, &optics))?
             .ok_or_else(|| root.missing("laser"))?;
-        let output = root.section("output", |section| output(section))?;
+        let output = root.section("output", output)?;
         Ok(Machine {
             name,
             scanner,

@@ -1,4 +1,5 @@
 //! Machine and recipe files: presets, round trips, and what is said of a faulty file.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
 use expect_test::{Expect, expect};
 use ftheta_formats::{machine, recipe};

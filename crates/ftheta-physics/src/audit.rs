@@ -280,8 +280,7 @@ fn refuse(draft: &PlanDraft, now: &Limits, place: impl Fn() -> String) -> Result
         ),
     ];
     for (ratio, share, quantity, limit, unit) in rows {
-        // The negated form also catches NaN.
-        if !(ratio <= share + ROUNDING) {
+        if ratio.is_nan() || ratio > share + ROUNDING {
             let (value, limit) = (ratio * limit, share * limit);
             return Err(AuditError::Limit {
                 place: place(),

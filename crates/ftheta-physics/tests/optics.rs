@@ -1,4 +1,5 @@
 //! The optics against numbers of an independent prototype (`design/optics.md`).
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
 use ftheta_model::machine::{Axis, Lens, Optics};
 use ftheta_model::space::{FieldPoint, MirrorAngles};

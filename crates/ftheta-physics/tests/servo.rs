@@ -1,4 +1,5 @@
 //! Motor and servo against the numbers of `design/measures.md` and `design/control.md`.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
 use ftheta_model::machine::{Scanner, Sensor, Servo};
 use ftheta_physics::axis_loop::{AxisLoop, spectral_radius};
@@ -128,7 +129,7 @@ fn response(scanner: &Scanner, frequency_hz: f64) -> (f64, f64) {
     (sine.hypot(cosine) / 1e-3, cosine.atan2(sine).to_degrees())
 }
 
-/// Numbers of the same regulator by another program (SciPy's Riccati solver and matrix exponential).
+/// Numbers of the same regulator by another program (SciPy: Riccati solver, matrix exponential).
 #[test]
 fn response_at_circle_frequencies_is_the_regulators() {
     let scanner = preset("S10");

@@ -19,6 +19,7 @@ const EXACT_CELLS: f64 = 3.0;
 const DDA_FRACTION: f64 = 1.0 / 256.0;
 
 /// Yields the blocks of a plan one after the other; memory does not grow with the plan.
+#[derive(Clone)]
 pub struct Renderer<'a> {
     plan: &'a Plan,
     words: Words<'a>,
@@ -44,6 +45,7 @@ struct Cursor {
 }
 
 /// Turns places into words.
+#[derive(Clone)]
 struct Words<'a> {
     plan: &'a Plan,
     table: Option<MapTable>,

@@ -30,10 +30,16 @@ pub struct Foot {
     pub at_mm: f64,
     /// Distance of the beam from it, mm.
     pub distance_mm: f64,
+    /// The polyline's segment it lies on.
+    segment: usize,
 }
 
-#[derive(Clone, Copy)]
-struct Best {
+/// A search under way, and the best point found.
+struct Query {
+    beam: Point,
+    expected_mm: f64,
+    /// Whole turns around a closed curve, mm.
+    shift_mm: f64,
     cost: f64,
     foot: Foot,
 }
@@ -102,58 +108,71 @@ impl Contour {
         }
     }
 
-    /// The point nearest to `beam` around an expected arc position.
+    /// The point nearest to `beam` around the start, for a beam `off_mm` from there.
+    pub fn nearest_to_start(&self, beam: Point, off_mm: f64) -> Foot {
+        let start = Foot {
+            at_mm: 0.0,
+            distance_mm: off_mm,
+            segment: 0,
+        };
+        self.nearest(beam, start, 0.0)
+    }
+
+    /// The point nearest to `beam`, which went on by `ahead_mm` from where `before` was nearest.
     ///
     /// # Limits
-    /// Searched are 0.75 mm of arc and four times `off_mm` to either side, so that a beam stays on
-    /// its own branch where the curve crosses itself farther away along it.
-    pub fn nearest(&self, beam: Point, expected_mm: f64, off_mm: f64) -> Foot {
+    /// Searched are 0.75 mm of arc and four times the last distance to either side, so that a beam
+    /// stays on its own branch where the curve crosses itself farther away along it.
+    pub fn nearest(&self, beam: Point, before: Foot, ahead_mm: f64) -> Foot {
         let length_mm = self.length_mm();
-        let mut reach_mm = REACH_MM + 4.0 * off_mm;
-        let mut best = Best {
+        let expected_mm = before.at_mm + ahead_mm;
+        let mut reach_mm = REACH_MM + 4.0 * before.distance_mm;
+        let mut query = Query {
+            beam,
+            expected_mm,
+            shift_mm: 0.0,
             cost: f64::INFINITY,
-            foot: Foot {
-                at_mm: 0.0,
-                distance_mm: f64::INFINITY,
-            },
+            foot: before,
         };
         if !self.closed {
-            let window = (expected_mm - reach_mm, expected_mm + reach_mm);
-            self.search(beam, window, 0.0, expected_mm, &mut best);
-            return best.foot;
+            self.search(&mut query, reach_mm, before.segment);
+            return query.foot;
         }
         reach_mm = reach_mm.min(0.5 * length_mm);
         let turn = (expected_mm / length_mm).floor();
         for shift in [turn, turn - 1.0, turn + 1.0] {
-            let shift_mm = shift * length_mm;
-            let lo = expected_mm - reach_mm - shift_mm;
-            let hi = expected_mm + reach_mm - shift_mm;
-            if hi >= 0.0 && lo <= length_mm {
-                self.search(beam, (lo, hi), shift_mm, expected_mm, &mut best);
+            query.shift_mm = shift * length_mm;
+            let at_mm = expected_mm - query.shift_mm;
+            if at_mm + reach_mm >= 0.0 && at_mm - reach_mm <= length_mm {
+                self.search(&mut query, reach_mm, before.segment);
             }
         }
-        best.foot
+        query.foot
     }
 
-    /// Searches the segments of a window; arc positions get `shift_mm` added.
-    fn search(
-        &self,
-        beam: Point,
-        window_mm: (f64, f64),
-        shift_mm: f64,
-        expected_mm: f64,
-        best: &mut Best,
-    ) {
+    /// Searches the segments within `reach_mm` of arc from the expected place, near `likely` first.
+    fn search(&self, query: &mut Query, reach_mm: f64, likely: usize) {
         let n = self.points.len() - 1;
-        if n == 1 {
-            self.look_at(0, beam, shift_mm, expected_mm, best);
-            return;
+        let at_mm = query.expected_mm - query.shift_mm;
+        let (from_mm, to_mm) = (at_mm - reach_mm, at_mm + reach_mm);
+        let outside = |lo: usize, hi: usize| self.arc_mm[hi] < from_mm || to_mm < self.arc_mm[lo];
+        let mut i = likely;
+        while i + 1 < n && self.arc_mm[i + 1] < at_mm {
+            i += 1;
         }
-        let first = self.segment_at(window_mm.0);
-        let end = self.segment_at(window_mm.1) + 1;
-        let likely = self.segment_at(expected_mm - shift_mm);
-        for i in likely.max(first)..(likely + 2).min(end) {
-            self.look_at(i, beam, shift_mm, expected_mm, best);
+        while i > 0 && at_mm < self.arc_mm[i] {
+            i -= 1;
+        }
+        for near in i.saturating_sub(1)..(i + 2).min(n) {
+            if !outside(near, near + 1) {
+                self.look_at(near, query);
+            }
+        }
+        if n <= 3 {
+            (0..n)
+                .filter(|&i| !outside(i, i + 1))
+                .for_each(|i| self.look_at(i, query));
+            return;
         }
         let mut stack = [(0usize, 0usize, 0usize); 64];
         stack[0] = (0, 0, n);
@@ -161,13 +180,13 @@ impl Contour {
         while n_waiting > 0 {
             n_waiting -= 1;
             let (node, lo, hi) = stack[n_waiting];
-            if hi <= first || end <= lo || distance_sq(self.boxes[node], beam) >= best.cost {
+            if outside(lo, hi) || distance_sq(self.boxes[node], query.beam) >= query.cost {
                 continue;
             }
             if hi - lo <= LEAF {
-                for i in lo.max(first)..hi.min(end) {
-                    self.look_at(i, beam, shift_mm, expected_mm, best);
-                }
+                (lo..hi)
+                    .filter(|&i| !outside(i, i + 1))
+                    .for_each(|i| self.look_at(i, query));
                 continue;
             }
             let middle = lo + (hi - lo) / 2;
@@ -177,32 +196,26 @@ impl Contour {
         }
     }
 
-    fn look_at(&self, i: usize, beam: Point, shift_mm: f64, expected_mm: f64, best: &mut Best) {
+    fn look_at(&self, i: usize, query: &mut Query) {
         let from = self.points[i];
         let way = self.points[i + 1] - from;
         let length_mm = self.arc_mm[i + 1] - self.arc_mm[i];
-        let t = ((beam - from).dot(way) / (length_mm * length_mm)).clamp(0.0, 1.0);
-        let distance_sq = (from + t * way).distance_squared(beam);
-        if distance_sq > best.cost {
+        let t = ((query.beam - from).dot(way) / (length_mm * length_mm)).clamp(0.0, 1.0);
+        let distance_sq = (from + t * way).distance_squared(query.beam);
+        if distance_sq > query.cost {
             return;
         }
-        let at_mm = self.arc_mm[i] + t * length_mm + shift_mm;
-        let ahead_mm = at_mm - expected_mm;
+        let at_mm = self.arc_mm[i] + t * length_mm + query.shift_mm;
+        let ahead_mm = at_mm - query.expected_mm;
         let cost = distance_sq + TIE_WEIGHT * ahead_mm * ahead_mm;
-        if cost < best.cost {
-            *best = Best {
-                cost,
-                foot: Foot {
-                    at_mm,
-                    distance_mm: distance_sq.sqrt(),
-                },
+        if cost < query.cost {
+            query.cost = cost;
+            query.foot = Foot {
+                at_mm,
+                distance_mm: distance_sq.sqrt(),
+                segment: i,
             };
         }
-    }
-
-    fn segment_at(&self, at_mm: f64) -> usize {
-        let i = self.arc_mm.partition_point(|&arc_mm| arc_mm <= at_mm);
-        i.saturating_sub(1).min(self.points.len() - 2)
     }
 
     fn place(&self, i: usize, at_mm: f64) -> Point {

@@ -93,21 +93,19 @@ impl BeamPath {
         best.1
     }
 
-    /// Distance of a place from the beam's way to and from point i.
+    /// Distance of a place from the beam's way to or from its nearest point i.
     fn distance_mm(&self, i: usize, place: Point) -> f64 {
         let at = self.points[i];
-        let distance_sq = |to: Point| {
+        let off = place - at;
+        let sides = [self.points.get(i + 1), self.points.get(i.wrapping_sub(1))];
+        for &to in sides.into_iter().flatten() {
             let way = to - at;
-            let t = ((place - at).dot(way) / way.hypot2()).clamp(0.0, 1.0);
-            (at + t * way).distance_squared(place)
-        };
-        let mut best = at.distance_squared(place);
-        if let Some(&next) = self.points.get(i + 1) {
-            best = best.min(distance_sq(next));
+            let along = off.dot(way);
+            if along > 0.0 {
+                let t = (along / way.hypot2()).min(1.0);
+                return (off - t * way).hypot2().sqrt();
+            }
         }
-        if i > 0 {
-            best = best.min(distance_sq(self.points[i - 1]));
-        }
-        best.sqrt()
+        off.hypot2().sqrt()
     }
 }

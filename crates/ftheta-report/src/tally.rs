@@ -64,7 +64,7 @@ impl Tally {
             square_um2_s: 0.0,
             coverage_um: Histogram::of_errors_um(),
             end_um: Histogram::of_errors_um(),
-            dose: Histogram::new(1e-4, 1e4, 1.001),
+            dose: Histogram::new(1e-4, 1e4, 10),
             dose_bars: vec![0.0; N_DOSE_BARS],
             stray_j: 0.0,
             energy_j: 0.0,

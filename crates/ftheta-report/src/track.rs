@@ -47,7 +47,7 @@ impl MarkTrack {
         let step_mm = STEP_MM.max(contour.length_mm() / N_SAMPLES_MAX);
         let start = contour.samples(0.0, 1).next();
         let off_mm = start.map_or(0.0, |(_, start)| start.distance(beam));
-        let foot = contour.nearest(beam, 0.0, off_mm);
+        let foot = contour.nearest_to_start(beam, off_mm);
         let mut path = BeamPath::default();
         path.add(beam, foot.at_mm, 0.0);
         Self {
@@ -67,8 +67,8 @@ impl MarkTrack {
     /// Moves the beam to `beam` while `energy_j` is emitted; returns the nearest point before.
     pub fn advance(&mut self, beam: Point, energy_j: f64) -> Foot {
         let before = self.foot;
-        let expected_mm = before.at_mm + self.beam.distance(beam);
-        self.foot = self.contour.nearest(beam, expected_mm, before.distance_mm);
+        let ahead_mm = self.beam.distance(beam);
+        self.foot = self.contour.nearest(beam, before, ahead_mm);
         self.beam = beam;
         self.dose.add(before.at_mm, self.foot.at_mm, energy_j);
         self.path.add(beam, self.foot.at_mm, self.step_mm);

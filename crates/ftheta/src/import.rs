@@ -21,9 +21,7 @@ pub fn drawing(
     recipe: &Recipe,
     options: &svg::SvgOptions,
 ) -> Result<Imported<Job>, Error> {
-    let extension = path
-        .extension()
-        .map(|extension| extension.to_ascii_lowercase());
+    let extension = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
     match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("svg" | "svgz") => {
             svg::read(&bytes(path)?, recipe, options).map_err(|source| Error::Svg {

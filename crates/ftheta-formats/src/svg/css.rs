@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// Selectors times declarations that are taken: the parser copies them for each other.
 const N_DECLARATIONS_MAX: usize = 1_000_000;
 /// Elements that selectors may look at, over the whole file.
-const N_STEPS_MAX: u64 = 300_000_000;
+const N_STEPS_MAX: u64 = 100_000_000;
 
 /// All rules of a file, in the order in which they apply.
 #[derive(Default)]

@@ -2,7 +2,8 @@
 
 use super::css::StyleSheets;
 use super::drawing::{Node, plain_attribute};
-use simplecss::DeclarationTokenizer;
+use simplecss::Declaration;
+use svgtypes::Paint;
 
 macro_rules! properties {
     ($($variant:ident = $name:literal,)*) => {
@@ -59,6 +60,8 @@ properties! {
 pub struct Declared<'a> {
     values: [Option<&'a str>; N_PROPERTIES],
     important: [bool; N_PROPERTIES],
+    /// The first paint that is none.
+    bad_paint: Option<(&'static str, &'a str)>,
 }
 
 impl<'a> Declared<'a> {
@@ -67,6 +70,7 @@ impl<'a> Declared<'a> {
         let mut declared = Self {
             values: [None; N_PROPERTIES],
             important: [false; N_PROPERTIES],
+            bad_paint: None,
         };
         for attribute in node
             .attributes()
@@ -78,7 +82,7 @@ impl<'a> Declared<'a> {
             declared.set(declaration.name, declaration.value, declaration.important);
         });
         if let Some(style) = plain_attribute(node, "style") {
-            for declaration in DeclarationTokenizer::from(style) {
+            for declaration in inline(style) {
                 declared.set(declaration.name, declaration.value, declaration.important);
             }
         }
@@ -95,14 +99,63 @@ impl<'a> Declared<'a> {
         self.get(property).is_some_and(|value| value != "none")
     }
 
+    /// What was stated but has no meaning.
+    pub fn fault(&self) -> Option<String> {
+        let (name, value) = self.bad_paint?;
+        Some(format!("{name}=\"{value}\" is no paint, ignored"))
+    }
+
     fn set(&mut self, name: &str, value: &'a str, important: bool) {
         let Some(property) = property_of(name) else {
             return;
         };
+        let value = value.trim();
+        let paint_name = match property {
+            Property::Fill => Some("fill"),
+            Property::Stroke => Some("stroke"),
+            _ => None,
+        };
+        if let Some(paint_name) = paint_name.filter(|_| Paint::from_str(value).is_err()) {
+            self.bad_paint.get_or_insert((paint_name, value));
+            return;
+        }
         let index = property as usize;
         if important || !self.important[index] {
-            self.values[index] = Some(value.trim());
+            self.values[index] = Some(value);
             self.important[index] = important;
         }
     }
+}
+
+/// The declarations of a `style` attribute.
+///
+/// simplecss would end them at the first `/`, as in `font: 4px/1 sans-serif`.
+fn inline(style: &str) -> impl Iterator<Item = Declaration<'_>> {
+    let mut quote = None;
+    let mut depth = 0_usize;
+    let ends = move |character: char| {
+        match (quote, character) {
+            (Some(open), _) if open == character => quote = None,
+            (Some(_), _) => {}
+            (None, '"' | '\'') => quote = Some(character),
+            (None, '(') => depth += 1,
+            (None, ')') => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        character == ';' && quote.is_none() && depth == 0
+    };
+    style.split(ends).filter_map(|declaration| {
+        let (name, value) = declaration.split_once(':')?;
+        let plain = value.trim_end().strip_suffix("!important");
+        Some(Declaration {
+            name: without_comment(name),
+            value: plain.unwrap_or(value),
+            important: plain.is_some(),
+        })
+    })
+}
+
+/// A name without the comment that may stand before it.
+fn without_comment(name: &str) -> &str {
+    name.rsplit("*/").next().unwrap_or(name).trim()
 }

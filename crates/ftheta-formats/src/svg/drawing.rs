@@ -45,11 +45,21 @@ pub fn parse<'a>(text: &'a str, limits: &Limits) -> Result<Document<'a>, SvgErro
             what: "elements",
             limit: limits.n_nodes_max as usize,
         },
-        error => SvgError::Xml {
-            line: error.pos().row,
-            column: error.pos().col,
-            message: error.to_string(),
-        },
+        roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream => {
+            SvgError::Truncated {
+                line: text.lines().count() as u32,
+            }
+        }
+        error => {
+            let roxmltree::TextPos { row, col } = error.pos();
+            let message = error.to_string();
+            let position = format!(" at {row}:{col}");
+            SvgError::Xml {
+                line: row,
+                column: col,
+                message: message.strip_suffix(&position).unwrap_or(&message).into(),
+            }
+        }
     })
 }
 

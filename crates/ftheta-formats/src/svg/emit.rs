@@ -22,13 +22,15 @@ pub fn shape<'a>(
     geometry: Geometry,
     context: &Context<'a>,
 ) -> Result<(), SvgError> {
+    let faulty = geometry.fault.is_some();
     reader.warn_of_fault(node, geometry.fault);
     if geometry.cut {
         return Err(too_many_curves(reader, node));
     }
     if geometry.path.is_empty() {
         reader.tally.n_dropped += 1;
-        if !matches!(node.tag_name().name(), "path" | "polyline" | "polygon") {
+        let may_be_empty = matches!(node.tag_name().name(), "path" | "polyline" | "polygon");
+        if !faulty && !may_be_empty {
             let place = reader.drawing.place(node);
             reader
                 .warnings
@@ -55,17 +57,15 @@ pub fn mark<'a>(
 ) -> Result<(), SvgError> {
     let style = &context.style;
     let mut visible = false;
-    if area && encloses(path) {
-        if let Some(color_rgb) = color_of(reader, node, style.visible_fill(), context) {
-            visible = true;
-            add(
-                reader,
-                node,
-                path.clone(),
-                (Paint::Fill(style.fill_rule), color_rgb),
-                context,
-            )?;
-        }
+    let fill = if area && encloses(path) {
+        color_of(reader, node, style.visible_fill(), context)
+    } else {
+        None
+    };
+    if let Some(color_rgb) = fill {
+        visible = true;
+        let paint = (Paint::Fill(style.fill_rule), color_rgb);
+        add(reader, node, path.clone(), paint, context)?;
     }
     if let Some(color_rgb) = color_of(reader, node, style.visible_stroke(), context) {
         visible = true;

@@ -37,6 +37,12 @@ pub enum SvgError {
         /// What the XML parser says.
         message: String,
     },
+    /// Markup that stops before its elements are closed.
+    #[error("line {line}: the file ends before <svg> is closed")]
+    Truncated {
+        /// The last line.
+        line: u32,
+    },
     /// The outermost element is something else.
     #[error("the outermost element is <{tag}>, not <svg>")]
     NotSvg {
@@ -105,6 +111,7 @@ impl SvgError {
                 String::new(),
                 String::new(),
             ),
+            Self::Truncated { line } => (format!("line {line}"), String::new(), "</svg>".into()),
             Self::NotSvg { tag } => (String::new(), format!("<{tag}>"), "<svg>".into()),
             Self::TooDeep { place, limit } => {
                 (place.clone(), String::new(), format!("{limit} levels"))

@@ -143,7 +143,7 @@ fn polyline(node: Node<'_>, closed: bool) -> Geometry {
     let text = plain_attribute(node, "points").unwrap_or("");
     let mut path = BezPath::new();
     for (x, y) in PointsParser::from(text) {
-        if path.is_empty() {
+        if path.elements().is_empty() {
             path.move_to((x, y));
         } else {
             path.line_to((x, y));

@@ -101,6 +101,10 @@ pub fn read(
         });
     }
     let mut reader = Reader::new(&drawing, recipe, options.limits);
+    if options.system_fonts {
+        let message = "fonts of this computer are not supported, the bundled ones are used";
+        reader.warnings.add("<text>", message);
+    }
     let page = match Page::of(root, &mut reader.warnings)? {
         Some(page) => page,
         None => {

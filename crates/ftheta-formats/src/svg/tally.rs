@@ -35,7 +35,7 @@ impl Tally {
         ]
         .into_iter()
         .filter(|(count, _)| *count != 0)
-        .map(|(count, what)| format!("{count} {what}"))
+        .map(|(count, what)| format!("{what} ({count})"))
         .collect();
         if parts.is_empty() {
             "the drawing holds no shapes".into()

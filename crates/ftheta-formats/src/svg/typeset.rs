@@ -150,7 +150,7 @@ fn set_line<'a>(
     };
     for (characters, fate) in [
         (&lettering.missing, "left out"),
-        (&lettering.replaced, "spelt without accent or with others"),
+        (&lettering.replaced, "spelt with others"),
     ] {
         if !characters.is_empty() {
             let mut names: Vec<char> = characters.clone();

@@ -163,6 +163,9 @@ impl<'a, 'r> Reader<'a, 'r> {
             self.tally.n_invisible += 1;
             return Ok(false);
         }
+        if let Some(fault) = declared.fault() {
+            self.warnings.add(self.drawing.place(node), fault);
+        }
         self.warn_of_effects(node, &declared);
         context
             .style
@@ -174,7 +177,7 @@ impl<'a, 'r> Reader<'a, 'r> {
         {
             let Some(transform) = transform_of(text) else {
                 self.tally.n_dropped += 1;
-                let message = format!("transform=\"{text}\" cannot be read, left out");
+                let message = format!("transform=\"{text}\" cannot be used, left out");
                 self.warnings.add(self.drawing.place(node), message);
                 return Ok(false);
             };
@@ -312,6 +315,11 @@ impl<'a, 'r> Reader<'a, 'r> {
             mm_per_unit: context.mm_per_unit(),
             n_elements_max: self.limits.n_path_elements_max - self.tally.n_path_elements,
         };
+        let moves = |child: &Node<'a>| tag_of(*child).is_some_and(|tag| ignored(tag).is_some());
+        if let Some(child) = node.children().find(moves) {
+            let reason = format!("<{}> in it is ignored", child.tag_name().name());
+            self.warnings.add(self.drawing.place(node), reason);
+        }
         match geometry::of(node, tag, &scale) {
             Some(geometry) => emit::shape(self, node, geometry, context),
             None => {

@@ -59,8 +59,8 @@ impl Settings {
         let lag_ns = (lag_s * 1e9).round() as i64;
         Ok(Self {
             jump_speed_mm_s: recipe.jump_speed_mm_s.unwrap_or(JUMP_SPEED_MM_S),
-            jump_delay_min_s: recipe.jump_delay_min_s.unwrap_or(0.5 * lag_s),
-            jump_delay_s: recipe.jump_delay_s.unwrap_or(1.5 * lag_s),
+            jump_delay_min_s: recipe.jump_delay_min_s.unwrap_or(lag_s),
+            jump_delay_s: recipe.jump_delay_s.unwrap_or(2.0 * lag_s),
             jump_length_limit_mm: recipe.jump_length_limit_mm.unwrap_or(JUMP_LENGTH_LIMIT_MM),
             mark_delay_s: recipe.mark_delay_s.unwrap_or(lag_s),
             polygon_delay_s: recipe.polygon_delay_s.unwrap_or(lag_s),

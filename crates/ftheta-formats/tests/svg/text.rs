@@ -1,4 +1,4 @@
-//! Text in drawings becomes letters at the places that SVG gives them.
+//! Text becomes letters at the places that SVG gives them.
 
 use expect_test::{Expect, expect};
 use ftheta_formats::svg::{SvgOptions, read};
@@ -93,7 +93,7 @@ fn single_strokes() {
               1.571 0.643 to 2.857 0.643
               3.429 0.643 to 4.714 0.643
             warning: #t: no letter in Hershey Simplex for "ж", left out
-            warning: #t: no letter in Hershey Simplex for "±é", spelt without accent or with others
+            warning: #t: no letter in Hershey Simplex for "±é", spelt with others
         "#]],
     );
 }
