@@ -18,23 +18,13 @@ pub fn check(root: &Path) -> Result<(), String> {
         .filter_map(|line| line.split('"').nth(1))
         .collect();
     let output = Command::new(env!("CARGO"))
-        .args([
-            "tree",
-            "--workspace",
-            "--edges",
-            "normal",
-            "--prefix",
-            "none",
-        ])
+        .args(["tree", "--workspace", "--edges", "normal", "--prefix", "none"])
         .args(["--format", "{p}\t{l}"])
         .current_dir(root)
         .output()
         .map_err(|error| format!("cannot run cargo tree: {error}"))?;
     if !output.status.success() {
-        return Err(format!(
-            "cargo tree failed: {}",
-            String::from_utf8_lossy(&output.stderr)
-        ));
+        return Err(format!("cargo tree failed: {}", String::from_utf8_lossy(&output.stderr)));
     }
     let mut refused: Vec<String> = String::from_utf8_lossy(&output.stdout)
         .lines()
@@ -44,24 +34,14 @@ pub fn check(root: &Path) -> Result<(), String> {
         .collect();
     refused.sort();
     refused.dedup();
-    if refused.is_empty() {
-        Ok(())
-    } else {
-        Err(refused.join("\n"))
-    }
+    if refused.is_empty() { Ok(()) } else { Err(refused.join("\n")) }
 }
 
 /// Whether one alternative of an SPDX expression has only licences of the list.
 fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
-    expression
-        .replace(['(', ')'], "")
-        .replace('/', " OR ")
-        .split(" OR ")
-        .any(|alternative| {
-            alternative
-                .split(" AND ")
-                .all(|licence| allowed.contains(&licence.trim()))
-        })
+    expression.replace(['(', ')'], "").replace('/', " OR ").split(" OR ").any(|alternative| {
+        alternative.split(" AND ").all(|licence| allowed.contains(&licence.trim()))
+    })
 }
 
 #[cfg(test)]

@@ -37,55 +37,24 @@ fn ci() -> Result<(), String> {
     step("tidy", || tidy::check(&root()))?;
     step("licences", || licence::check(&root()))?;
     // The profile of the tests, so that dependencies are compiled once.
-    cargo(&[
-        "clippy",
-        "--release",
-        "--workspace",
-        "--all-targets",
-        "--",
-        "-D",
-        "warnings",
-    ])?;
-    cargo(&[
-        "doc",
-        "--release",
-        "--workspace",
-        "--no-deps",
-        "--document-private-items",
-    ])?;
+    cargo(&["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"])?;
+    cargo(&["doc", "--release", "--workspace", "--no-deps", "--document-private-items"])?;
     test()
 }
 
 fn test() -> Result<(), String> {
     cargo(&["test", "--release", "--workspace", "--all-targets"])?;
     cargo(&["test", "--release", "--workspace", "--doc"])?;
-    cargo(&[
-        "run",
-        "--release",
-        "--package",
-        "ftheta",
-        "--example",
-        "01_mark_svg",
-    ])?;
+    cargo(&["run", "--release", "--package", "ftheta", "--example", "01_mark_svg"])?;
     let out = root().join("target/xtask-mark");
     let out = out.to_string_lossy();
-    cargo(&[
-        "run",
-        "--release",
-        "--",
-        "mark",
-        "gallery/panel.svg",
-        "--out",
-        &out,
-    ])
+    cargo(&["run", "--release", "--", "mark", "gallery/panel.svg", "--out", &out])
 }
 
 /// The folder of the workspace.
 fn root() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    package
-        .parent()
-        .map_or_else(|| package.to_owned(), Path::to_owned)
+    package.parent().map_or_else(|| package.to_owned(), Path::to_owned)
 }
 
 fn cargo(arguments: &[&str]) -> Result<(), String> {
@@ -107,9 +76,6 @@ fn step(name: &str, run: impl FnOnce() -> Result<(), String>) -> Result<(), Stri
     eprintln!("xtask: {name}");
     let started = Instant::now();
     run()?;
-    eprintln!(
-        "xtask: {name}: done in {:.1} s",
-        started.elapsed().as_secs_f64()
-    );
+    eprintln!("xtask: {name}: done in {:.1} s", started.elapsed().as_secs_f64());
     Ok(())
 }

@@ -45,11 +45,7 @@ pub fn check(root: &Path) -> Result<(), String> {
     }
     files.sort();
     for path in &files {
-        let shown = path
-            .strip_prefix(root)
-            .unwrap_or(path)
-            .display()
-            .to_string();
+        let shown = path.strip_prefix(root).unwrap_or(path).display().to_string();
         if fs::metadata(path).is_ok_and(|data| data.len() > FILE_BYTES_MAX) {
             findings.push(format!("{shown}: larger than 1 MiB"));
         }
@@ -59,11 +55,7 @@ pub fn check(root: &Path) -> Result<(), String> {
             _ => {}
         }
     }
-    if findings.is_empty() {
-        Ok(())
-    } else {
-        Err(findings.join("\n"))
-    }
+    if findings.is_empty() { Ok(()) } else { Err(findings.join("\n")) }
 }
 
 /// Arrows between crates point down, and each crate says the same sentence in two places.
@@ -85,9 +77,7 @@ fn layers(root: &Path, findings: &mut Vec<String>) {
                 findings.push(format!("crates/{name}: must not see {seen}"));
             }
         }
-        let sentence = manifest
-            .lines()
-            .find_map(|line| line.strip_prefix("description = "));
+        let sentence = manifest.lines().find_map(|line| line.strip_prefix("description = "));
         let sentence = sentence.unwrap_or_default().trim_matches('"');
         let main = ["src/lib.rs", "src/main.rs"].map(|file| read(&folder.path().join(file)));
         let documented = main.concat();
@@ -121,15 +111,9 @@ fn source(path: &Path, shown: &str, findings: &mut Vec<String>) {
         findings.push(format!("{shown}: {n_lines} lines, limit {LINES_MAX}"));
     }
     if !text.starts_with("//! ") {
-        findings.push(format!(
-            "{shown}: does not begin with a sentence about itself"
-        ));
+        findings.push(format!("{shown}: does not begin with a sentence about itself"));
     }
-    let stem = path
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     if MODULES_BANNED.contains(&stem.as_str()) {
         findings.push(format!("{shown}: a name that says nothing"));
     }
@@ -143,14 +127,7 @@ fn source(path: &Path, shown: &str, findings: &mut Vec<String>) {
         if line.chars().count() > COLUMNS_MAX && !line.contains('"') && !line.contains('|') {
             findings.push(format!("{at}: more than {COLUMNS_MAX} columns"));
         }
-        for word in [
-            "FIXME",
-            "XXX",
-            "#[ignore",
-            "should_panic",
-            "/work/",
-            "/root/",
-        ] {
+        for word in ["FIXME", "XXX", "#[ignore", "should_panic", "/work/", "/root/"] {
             if line.contains(word) {
                 findings.push(format!("{at}: contains {word}"));
             }

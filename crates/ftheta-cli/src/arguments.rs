@@ -147,34 +147,19 @@ impl From<OrderName> for Order {
 
 fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| {
-        if value > 0.0 {
-            Ok(value)
-        } else {
-            Err(format!("{value} is not greater than 0"))
-        }
+        if value > 0.0 { Ok(value) } else { Err(format!("{value} is not greater than 0")) }
     })
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| {
-        if value >= 0.0 {
-            Ok(value)
-        } else {
-            Err(format!("{value} is less than 0"))
-        }
+        if value >= 0.0 { Ok(value) } else { Err(format!("{value} is less than 0")) }
     })
 }
 
 fn number(text: &str) -> Result<f64, String> {
-    let value: f64 = text
-        .trim()
-        .parse()
-        .map_err(|_| format!("\"{text}\" is not a number"))?;
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("{value} is not finite"))
-    }
+    let value: f64 = text.trim().parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if value.is_finite() { Ok(value) } else { Err(format!("{value} is not finite")) }
 }
 
 /// Reads `f1=+0.03,kt=-0.02,zeta=0.0025`.
@@ -216,14 +201,7 @@ mod tests {
     #[test]
     fn mismatch_is_read_or_refused() {
         let read = mismatch("f1=+0.03, kt=-0.02,zeta=0.0025").unwrap();
-        assert_eq!(
-            read,
-            Mismatch {
-                f1: 0.03,
-                kt: -0.02,
-                zeta: Some(0.0025)
-            }
-        );
+        assert_eq!(read, Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025) });
         assert_eq!(mismatch("").unwrap(), Mismatch::default());
         for (text, expected) in [
             ("f1", "\"f1\" is not of the form key=value"),

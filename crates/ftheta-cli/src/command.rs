@@ -10,10 +10,5 @@ use clap_complete::Shell;
 
 /// Prints the completion script of a shell.
 pub fn completions(shell: Shell) {
-    clap_complete::generate(
-        shell,
-        &mut Arguments::command(),
-        "ftheta",
-        &mut std::io::stdout(),
-    );
+    clap_complete::generate(shell, &mut Arguments::command(), "ftheta", &mut std::io::stdout());
 }

@@ -105,7 +105,5 @@ fn twin(score: &Score) -> Value {
 }
 
 fn object<T: Clone + Into<Value>>(rows: &[(&str, T)]) -> Value {
-    rows.iter()
-        .map(|(key, value)| ((*key).to_owned(), value.clone().into()))
-        .collect()
+    rows.iter().map(|(key, value)| ((*key).to_owned(), value.clone().into())).collect()
 }

@@ -19,12 +19,7 @@ const PATIENCE: Duration = Duration::from_millis(500);
 impl Progress {
     /// Starts the clock in a first stage.
     pub fn new(stage: &'static str) -> Self {
-        Self {
-            bar: None,
-            started: Instant::now(),
-            stage,
-            stages: Vec::new(),
-        }
+        Self { bar: None, started: Instant::now(), stage, stages: Vec::new() }
     }
 
     /// Takes note of a stage of the main job.

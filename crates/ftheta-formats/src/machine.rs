@@ -22,23 +22,13 @@ const G_CM2: f64 = 1e-7;
 pub fn read(file: &str, text: &str) -> Result<Machine, TomlError> {
     parse(file, text, |root| {
         let name = root.text("name")?.unwrap_or(file).to_owned();
-        let scanner = root
-            .section("scanner", scanner)?
-            .ok_or_else(|| root.missing("scanner"))?;
-        let optics = root
-            .section("optics", optics)?
-            .ok_or_else(|| root.missing("optics"))?;
+        let scanner = root.section("scanner", scanner)?.ok_or_else(|| root.missing("scanner"))?;
+        let optics = root.section("optics", optics)?.ok_or_else(|| root.missing("optics"))?;
         let laser = root
             .section("laser", |section| laser(section, &optics))?
             .ok_or_else(|| root.missing("laser"))?;
         let output = root.section("output", output)?;
-        Ok(Machine {
-            name,
-            scanner,
-            optics,
-            laser,
-            output: output.unwrap_or(DEFAULT_OUTPUT),
-        })
+        Ok(Machine { name, scanner, optics, laser, output: output.unwrap_or(DEFAULT_OUTPUT) })
     })
 }
 
@@ -50,9 +40,7 @@ const DEFAULT_OUTPUT: Output = Output {
 };
 
 fn scanner(section: &Section<'_>) -> Result<Scanner, TomlError> {
-    let servo = section
-        .section("servo", servo)?
-        .ok_or_else(|| section.missing("servo"))?;
+    let servo = section.section("servo", servo)?.ok_or_else(|| section.missing("servo"))?;
     let sensor = section.section("sensor", sensor)?.unwrap_or_default();
     Ok(Scanner {
         rotor_inertia_kg_m2: section.need("rotor_inertia_g_cm2", 1e-5..=1e4)? * G_CM2,
@@ -66,17 +54,10 @@ fn scanner(section: &Section<'_>) -> Result<Scanner, TomlError> {
         current_max_a: section.need("current_max_a", 0.01..=1e3)?,
         current_rms_a: section.need("current_rms_a", 0.01..=1e3)?,
         thermal_time_s: section.number("thermal_time_s", 1e-3..=1e4)?.unwrap_or(1.0),
-        angle_max_rad: section
-            .number("angle_max_deg", 0.1..=45.0)?
-            .unwrap_or(12.5)
-            .to_radians(),
-        speed_max_rad_s: section
-            .number("speed_max_rad_s", 0.1..=1e5)?
-            .unwrap_or(1000.0),
+        angle_max_rad: section.number("angle_max_deg", 0.1..=45.0)?.unwrap_or(12.5).to_radians(),
+        speed_max_rad_s: section.number("speed_max_rad_s", 0.1..=1e5)?.unwrap_or(1000.0),
         f1_uncertainty: section.number("f1_uncertainty", 0.0..=0.5)?.unwrap_or(0.03),
-        kt_uncertainty: section
-            .number("kt_uncertainty", 0.0..=0.5)?
-            .unwrap_or(0.005),
+        kt_uncertainty: section.number("kt_uncertainty", 0.0..=0.5)?.unwrap_or(0.005),
         servo,
         sensor,
     })
@@ -84,10 +65,7 @@ fn scanner(section: &Section<'_>) -> Result<Scanner, TomlError> {
 
 fn servo(section: &Section<'_>) -> Result<Servo, TomlError> {
     let kinds = [("state-feedback", false), ("pid", true)];
-    if !section
-        .choice("kind", &kinds)?
-        .ok_or_else(|| section.missing("kind"))?
-    {
+    if !section.choice("kind", &kinds)?.ok_or_else(|| section.missing("kind"))? {
         return Ok(Servo::StateFeedback {
             velocity_weight_s: section.need("velocity_weight_us", 0.1..=1e5)? * 1e-6,
             lag_s: section.need("lag_us", 1.0..=1e5)? * 1e-6,
@@ -113,10 +91,7 @@ fn sensor(section: &Section<'_>) -> Result<Sensor, TomlError> {
 
 fn optics(section: &Section<'_>) -> Result<Optics, TomlError> {
     let kinds = [("f-theta", false), ("post-objective", true)];
-    let lens = if section
-        .choice("kind", &kinds)?
-        .ok_or_else(|| section.missing("kind"))?
-    {
+    let lens = if section.choice("kind", &kinds)?.ok_or_else(|| section.missing("kind"))? {
         Lens::PostObjective {
             mirror_distance_mm: section.need("mirror_distance_mm", 0.0..=1e3)?,
             working_distance_mm: section.need("working_distance_mm", 1.0..=1e5)?,
@@ -140,16 +115,13 @@ fn optics(section: &Section<'_>) -> Result<Optics, TomlError> {
 
 fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
     let wavelength_nm = section.need("wavelength_nm", 100.0..=20_000.0)?;
-    let beam_quality_m2 = section
-        .number("beam_quality_m2", 1.0..=100.0)?
-        .unwrap_or(1.0);
+    let beam_quality_m2 = section.number("beam_quality_m2", 1.0..=100.0)?.unwrap_or(1.0);
     let beam_diameter_mm = section.need("beam_diameter_mm", 0.05..=200.0)?;
     let focal_mm = match &optics.lens {
         Lens::FTheta { coefficients_mm } => coefficients_mm[0],
-        Lens::PostObjective {
-            mirror_distance_mm,
-            working_distance_mm,
-        } => mirror_distance_mm + working_distance_mm,
+        Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
+            mirror_distance_mm + working_distance_mm
+        }
     };
     // The diffraction limit; a measured spot overrides it.
     let limit_mm =
@@ -181,15 +153,11 @@ fn output(section: &Section<'_>) -> Result<Output, TomlError> {
     ];
     Ok(Output {
         period_ns: tenths as u32 * 100,
-        word_bits: section
-            .whole("word_bits", 8..=24)?
-            .unwrap_or(DEFAULT_OUTPUT.word_bits),
+        word_bits: section.whole("word_bits", 8..=24)?.unwrap_or(DEFAULT_OUTPUT.word_bits),
         word_range_rad: section
             .number("word_range_deg", 0.1..=60.0)?
             .map_or(DEFAULT_OUTPUT.word_range_rad, f64::to_radians),
-        drive: section
-            .choice("drive", &drives)?
-            .unwrap_or(DEFAULT_OUTPUT.drive),
+        drive: section.choice("drive", &drives)?.unwrap_or(DEFAULT_OUTPUT.drive),
     })
 }
 

@@ -35,11 +35,9 @@ impl PlanFileError {
     /// Place, value and limit for a machine-readable message.
     pub fn fault(&self) -> (String, String, String) {
         match self {
-            Self::Line {
-                line,
-                expected,
-                found,
-            } => (format!("line {line}"), found.clone(), (*expected).into()),
+            Self::Line { line, expected, found } => {
+                (format!("line {line}"), found.clone(), (*expected).into())
+            }
             Self::Machine(error) => error.fault(),
         }
     }
@@ -52,36 +50,17 @@ impl PlanFileError {
 pub fn write(draft: &PlanDraft, id: &str, out: &mut impl Write) -> io::Result<()> {
     let machine = machine::to_toml(&draft.machine);
     let Planner::Classic = draft.planner;
-    writeln!(
-        out,
-        "{HEADER}\nid {id}\nplanner classic\ntolerance_mm {}",
-        draft.tolerance_mm
-    )?;
+    writeln!(out, "{HEADER}\nid {id}\nplanner classic\ntolerance_mm {}", draft.tolerance_mm)?;
     writeln!(out, "machine {}\n{machine}", machine.lines().count())?;
     writeln!(out, "pens {}", draft.pens.len())?;
     for pen in &draft.pens {
         let name = one_line(&pen.name);
-        writeln!(
-            out,
-            "{} {} {} {name}",
-            pen.mark_speed_mm_s, pen.power_w, pen.n_passes
-        )?;
+        writeln!(out, "{} {} {} {name}", pen.mark_speed_mm_s, pen.power_w, pen.n_passes)?;
     }
     writeln!(out, "marks {}", draft.marks.len())?;
     for mark in &draft.marks {
-        let PlannedMark {
-            curve,
-            pen_index,
-            source,
-            on_ns,
-            off_ns,
-            power_w,
-        } = mark;
-        writeln!(
-            out,
-            "{pen_index} {on_ns} {off_ns} {power_w} {}",
-            one_line(source)
-        )?;
+        let PlannedMark { curve, pen_index, source, on_ns, off_ns, power_w } = mark;
+        writeln!(out, "{pen_index} {on_ns} {off_ns} {power_w} {}", one_line(source))?;
         writeln!(out, "{}", curve.to_svg())?;
     }
     writeln!(out, "vertices {}", draft.vertices.len())?;
@@ -107,12 +86,7 @@ fn write_segment(segment: &Segment, out: &mut impl Write) -> io::Result<()> {
     }
     match segment.motion {
         Motion::Hold { vertex } => writeln!(out, "hold {vertex}"),
-        Motion::Travel {
-            first_vertex,
-            n_vertices,
-            profile: p,
-            interpolation,
-        } => {
+        Motion::Travel { first_vertex, n_vertices, profile: p, interpolation } => {
             let kind = match interpolation {
                 Interpolation::Absolute => "travel",
                 Interpolation::Dda => "dda",
@@ -131,10 +105,7 @@ fn write_segment(segment: &Segment, out: &mut impl Write) -> io::Result<()> {
 /// # Errors
 /// The first line that is not as [`write`] makes it. A file cut short lacks its last line.
 pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
-    let mut lines = Lines {
-        lines: text.lines(),
-        number: 0,
-    };
+    let mut lines = Lines { lines: text.lines(), number: 0 };
     let header = lines.next("the header of a plan file")?;
     if header != HEADER {
         return Err(lines.error("\"ftheta-plan 1\"", header));
@@ -197,14 +168,7 @@ fn read_mark(lines: &mut Lines<'_>) -> Result<PlannedMark, PlanFileError> {
     if curve.elements().len() < 2 || !curve.is_finite() {
         return Err(lines.error("a finite curve", path));
     }
-    Ok(PlannedMark {
-        curve,
-        pen_index,
-        source: source.into(),
-        on_ns,
-        off_ns,
-        power_w,
-    })
+    Ok(PlannedMark { curve, pen_index, source: source.into(), on_ns, off_ns, power_w })
 }
 
 fn read_vertex(lines: &mut Lines<'_>) -> Result<Point, PlanFileError> {
@@ -227,11 +191,7 @@ fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
     let interpolation = match kind {
         "hold" => {
             let vertex = lines.field(&mut fields, "a vertex")?;
-            return Ok(Segment {
-                mark_index,
-                n_ticks,
-                motion: Motion::Hold { vertex },
-            });
+            return Ok(Segment { mark_index, n_ticks, motion: Motion::Hold { vertex } });
         }
         "travel" => Interpolation::Absolute,
         "dda" => Interpolation::Dda,
@@ -248,11 +208,7 @@ fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
         },
         interpolation,
     };
-    Ok(Segment {
-        mark_index,
-        n_ticks,
-        motion,
-    })
+    Ok(Segment { mark_index, n_ticks, motion })
 }
 
 /// The lines of the file, counted.
@@ -264,18 +220,12 @@ struct Lines<'a> {
 impl<'a> Lines<'a> {
     fn next(&mut self, expected: &'static str) -> Result<&'a str, PlanFileError> {
         self.number += 1;
-        self.lines
-            .next()
-            .ok_or_else(|| self.error(expected, "the end of the file"))
+        self.lines.next().ok_or_else(|| self.error(expected, "the end of the file"))
     }
 
     fn error(&self, expected: &'static str, found: &str) -> PlanFileError {
         let found = found.chars().take(60).collect();
-        PlanFileError::Line {
-            line: self.number,
-            expected,
-            found,
-        }
+        PlanFileError::Line { line: self.number, expected, found }
     }
 
     fn parse<T: FromStr>(&self, text: &str, expected: &'static str) -> Result<T, PlanFileError> {

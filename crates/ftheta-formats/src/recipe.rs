@@ -11,10 +11,7 @@ use ftheta_model::recipe::{ClassicRecipe, Hatch, Interpolation, Pen, PenRule, Re
 /// The first thing that is wrong, with line, value and limit. Unknown keys are errors.
 pub fn read(file: &str, text: &str) -> Result<Recipe, TomlError> {
     parse(file, text, |root| {
-        let styles = [
-            ("outline", TextStyle::Outline),
-            ("single-stroke", TextStyle::SingleStroke),
-        ];
+        let styles = [("outline", TextStyle::Outline), ("single-stroke", TextStyle::SingleStroke)];
         let text = root.section("text", |section| section.choice("style", &styles))?;
         let flatten = root.number("flatten_tolerance_um", 0.01..=1000.0)?;
         Ok(Recipe {
@@ -37,36 +34,19 @@ fn pen(section: &Section<'_>) -> Result<PenRule, TomlError> {
         None => None,
     };
     let layer = section.text("layer")?.map(str::to_owned);
-    let name = section
-        .text("name")?
-        .or(layer.as_deref())
-        .or(color)
-        .unwrap_or("pen")
-        .to_owned();
+    let name = section.text("name")?.or(layer.as_deref()).or(color).unwrap_or("pen").to_owned();
     let spacing_mm = section.number("hatch_spacing_mm", 1e-3..=1e3)?;
-    let angle_deg = section
-        .number("hatch_angle_deg", -360.0..=360.0)?
-        .unwrap_or(0.0);
+    let angle_deg = section.number("hatch_angle_deg", -360.0..=360.0)?.unwrap_or(0.0);
     let outline = section.boolean("hatch_outline")?.unwrap_or(true);
     let speed = section.number("mark_speed_mm_s", 1e-3..=1e6)?;
     let pen = Pen {
         name,
         mark_speed_mm_s: speed.unwrap_or(default.mark_speed_mm_s),
-        power_w: section
-            .number("power_w", 0.0..=1e5)?
-            .unwrap_or(default.power_w),
+        power_w: section.number("power_w", 0.0..=1e5)?.unwrap_or(default.power_w),
         n_passes: section.whole("passes", 1..=1000)?.unwrap_or(1),
-        hatch: spacing_mm.map(|spacing_mm| Hatch {
-            spacing_mm,
-            angle_deg,
-            outline,
-        }),
+        hatch: spacing_mm.map(|spacing_mm| Hatch { spacing_mm, angle_deg, outline }),
     };
-    Ok(PenRule {
-        pen,
-        color_rgb,
-        layer,
-    })
+    Ok(PenRule { pen, color_rgb, layer })
 }
 
 /// The colour of `#rrggbb` or `#rgb`.
@@ -85,15 +65,9 @@ fn rgb(text: &str) -> Option<[u8; 3]> {
 
 fn classic(section: &Section<'_>) -> Result<ClassicRecipe, TomlError> {
     let seconds = |key| Ok(section.number(key, 0.0..=1e5)?.map(|us| us * 1e-6));
-    let nanoseconds = |key| {
-        Ok(section
-            .number(key, -1e5..=1e5)?
-            .map(|us| (us * 1e3).round() as i64))
-    };
-    let kinds = [
-        ("absolute", Interpolation::Absolute),
-        ("dda", Interpolation::Dda),
-    ];
+    let nanoseconds =
+        |key| Ok(section.number(key, -1e5..=1e5)?.map(|us| (us * 1e3).round() as i64));
+    let kinds = [("absolute", Interpolation::Absolute), ("dda", Interpolation::Dda)];
     Ok(ClassicRecipe {
         jump_speed_mm_s: section.number("jump_speed_mm_s", 1e-3..=1e6)?,
         jump_delay_min_s: seconds("jump_delay_min_us")?,

@@ -78,48 +78,21 @@ impl TomlError {
     pub fn fault(&self) -> (String, String, String) {
         let at = |file: &str, line: &usize| format!("{file}:{line}");
         match self {
-            Self::Syntax {
-                file,
-                line,
-                message,
-            } => (at(file, line), message.clone(), "TOML".into()),
-            Self::UnknownKey {
-                file,
-                line,
-                key,
-                hint,
-            } => (
-                at(file, line),
-                key.clone(),
-                hint.trim_start_matches(", ").into(),
-            ),
-            Self::MissingKey { file, line, key } => (
-                at(file, line),
-                "missing".into(),
-                format!("{key} is required"),
-            ),
-            Self::Range {
-                file,
-                line,
-                key,
-                value,
-                limit,
-            } => (
-                format!("{}: {key}", at(file, line)),
-                value.clone(),
-                limit.clone(),
-            ),
-            Self::Kind {
-                file,
-                line,
-                key,
-                found,
-                expected,
-            } => (
-                format!("{}: {key}", at(file, line)),
-                found.clone(),
-                expected.clone(),
-            ),
+            Self::Syntax { file, line, message } => {
+                (at(file, line), message.clone(), "TOML".into())
+            }
+            Self::UnknownKey { file, line, key, hint } => {
+                (at(file, line), key.clone(), hint.trim_start_matches(", ").into())
+            }
+            Self::MissingKey { file, line, key } => {
+                (at(file, line), "missing".into(), format!("{key} is required"))
+            }
+            Self::Range { file, line, key, value, limit } => {
+                (format!("{}: {key}", at(file, line)), value.clone(), limit.clone())
+            }
+            Self::Kind { file, line, key, found, expected } => {
+                (format!("{}: {key}", at(file, line)), found.clone(), expected.clone())
+            }
         }
     }
 }
@@ -159,12 +132,7 @@ pub fn parse<T>(
 }
 
 fn line_of(text: &str, offset: usize) -> usize {
-    1 + text
-        .as_bytes()
-        .iter()
-        .take(offset)
-        .filter(|&&byte| byte == b'\n')
-        .count()
+    1 + text.as_bytes().iter().take(offset).filter(|&&byte| byte == b'\n').count()
 }
 
 impl<'a> Section<'a> {
@@ -226,9 +194,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         range: RangeInclusive<f64>,
     ) -> Result<Option<f64>, TomlError> {
-        self.get(key)
-            .map(|value| self.in_range(key, value, &range))
-            .transpose()
+        self.get(key).map(|value| self.in_range(key, value, &range)).transpose()
     }
 
     /// A number within a range, which must be there.
@@ -282,11 +248,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.get(key) else {
             return Ok(None);
         };
-        value
-            .get_ref()
-            .as_str()
-            .map(Some)
-            .ok_or_else(|| self.kind(key, value, "a text"))
+        value.get_ref().as_str().map(Some).ok_or_else(|| self.kind(key, value, "a text"))
     }
 
     /// One of the given words and what it stands for, if it is there.
@@ -301,10 +263,7 @@ impl<'a> Section<'a> {
         if let Some(&(_, choice)) = choices.iter().find(|(name, _)| *name == word) {
             return Ok(Some(choice));
         }
-        let names: Vec<String> = choices
-            .iter()
-            .map(|(name, _)| format!("\"{name}\""))
-            .collect();
+        let names: Vec<String> = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect();
         let value = &self.table[key];
         Err(self.range(key, value, names.join(", ")))
     }
@@ -314,11 +273,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.get(key) else {
             return Ok(None);
         };
-        value
-            .get_ref()
-            .as_bool()
-            .map(Some)
-            .ok_or_else(|| self.kind(key, value, "true or false"))
+        value.get_ref().as_bool().map(Some).ok_or_else(|| self.kind(key, value, "true or false"))
     }
 
     /// Reads a sub-table, if it is there; it must be asked for every key it has.
@@ -327,9 +282,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         read: impl FnOnce(&Section<'_>) -> Result<T, TomlError>,
     ) -> Result<Option<T>, TomlError> {
-        self.get(key)
-            .map(|value| self.enter(key, value, read))
-            .transpose()
+        self.get(key).map(|value| self.enter(key, value, read)).transpose()
     }
 
     /// Reads every table of an array of tables; none if it is not there.
@@ -345,10 +298,7 @@ impl<'a> Section<'a> {
             .get_ref()
             .as_array()
             .ok_or_else(|| self.kind(key, value, "an array of tables ([[...]])"))?;
-        array
-            .iter()
-            .map(|item| self.enter(key, item, &mut read))
-            .collect()
+        array.iter().map(|item| self.enter(key, item, &mut read)).collect()
     }
 
     fn enter<T>(
@@ -357,10 +307,7 @@ impl<'a> Section<'a> {
         value: &Spanned<DeValue<'_>>,
         read: impl FnOnce(&Section<'_>) -> Result<T, TomlError>,
     ) -> Result<T, TomlError> {
-        let table = value
-            .get_ref()
-            .as_table()
-            .ok_or_else(|| self.kind(key, value, "a table"))?;
+        let table = value.get_ref().as_table().ok_or_else(|| self.kind(key, value, "a table"))?;
         let section = Section {
             file: self.file,
             text: self.text,
@@ -376,10 +323,7 @@ impl<'a> Section<'a> {
 
     /// The error for a key that must be there; if another key looks meant for it, that one's.
     pub fn missing(&self, key: &'static str) -> TomlError {
-        let meant = self
-            .table
-            .iter()
-            .find(|(name, _)| likeness(name.get_ref(), key) > 0.7);
+        let meant = self.table.iter().find(|(name, _)| likeness(name.get_ref(), key) > 0.7);
         match meant {
             Some((name, _)) => self.unknown(name, &[key]),
             None => TomlError::MissingKey {
@@ -430,10 +374,8 @@ fn likeness(name: &str, key: &str) -> f64 {
 
 /// What was probably meant: the nearest known key, or all of them.
 fn hint(name: &str, known: &[&'static str]) -> String {
-    let nearest = known
-        .iter()
-        .map(|key| (likeness(name, key), key))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let nearest =
+        known.iter().map(|key| (likeness(name, key), key)).max_by(|a, b| a.0.total_cmp(&b.0));
     match nearest {
         Some((_, key)) if key.starts_with(&format!("{name}_")) => {
             format!(", the unit is missing: did you mean {key}?")

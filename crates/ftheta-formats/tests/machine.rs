@@ -17,19 +17,12 @@ fn every_preset_reads_and_survives_a_round_trip() {
 
 #[test]
 fn bare_names_have_their_lens() {
-    for (bare, f1_mm, wavelength_nm) in [
-        ("S10", 163.064, 355.0),
-        ("S14", 255.059, 532.0),
-        ("S25", 420.456, 1064.0),
-    ] {
+    for (bare, f1_mm, wavelength_nm) in
+        [("S10", 163.064, 355.0), ("S14", 255.059, 532.0), ("S25", 420.456, 1064.0)]
+    {
         let preset = machine::preset(bare).unwrap().unwrap();
-        let Lens::FTheta { coefficients_mm } = &preset.optics.lens else {
-            panic!("a lens")
-        };
-        assert_eq!(
-            (coefficients_mm[0], preset.laser.wavelength_nm),
-            (f1_mm, wavelength_nm)
-        );
+        let Lens::FTheta { coefficients_mm } = &preset.optics.lens else { panic!("a lens") };
+        assert_eq!((coefficients_mm[0], preset.laser.wavelength_nm), (f1_mm, wavelength_nm));
     }
     assert!(machine::preset("S11").is_none());
 }
@@ -38,11 +31,7 @@ fn bare_names_have_their_lens() {
 #[test]
 fn spots_of_presets_follow_from_their_beams() {
     for name in machine::PRESETS {
-        let stated = machine::preset(name)
-            .unwrap()
-            .unwrap()
-            .laser
-            .spot_diameter_mm;
+        let stated = machine::preset(name).unwrap().unwrap().laser.spot_diameter_mm;
         let text: String = machine::preset_text(name)
             .unwrap()
             .lines()
@@ -50,10 +39,7 @@ fn spots_of_presets_follow_from_their_beams() {
             .map(|line| format!("{line}\n"))
             .collect();
         let computed = machine::read(name, &text).unwrap().laser.spot_diameter_mm;
-        assert!(
-            (computed / stated - 1.0).abs() < 0.02,
-            "{name}: {computed} against {stated}"
-        );
+        assert!((computed / stated - 1.0).abs() < 0.02, "{name}: {computed} against {stated}");
     }
 }
 
@@ -110,11 +96,7 @@ fn faults_name_line_value_and_limit() {
         "period_us = 0",
         expect![["my.toml:45: output.period_us = 0 is outside 1 to 100"]],
     );
-    check(
-        "[optics]",
-        "[optics",
-        expect![["my.toml:28: unclosed table, expected `]`"]],
-    );
+    check("[optics]", "[optics", expect![["my.toml:28: unclosed table, expected `]`"]]);
 }
 
 #[test]
@@ -135,19 +117,8 @@ fn recipe_reads_pens_and_delays() {
     let recipe = recipe::read("r.toml", text).unwrap();
     assert_eq!(recipe.pens[0].color_rgb, Some([255, 0, 0]));
     assert_eq!(recipe.pens[0].pen.hatch.unwrap().spacing_mm, 0.05);
-    assert_eq!(
-        (
-            recipe.pens[1].pen.n_passes,
-            recipe.pens[1].pen.name.as_str()
-        ),
-        (3, "Cut")
-    );
+    assert_eq!((recipe.pens[1].pen.n_passes, recipe.pens[1].pen.name.as_str()), (3, "Cut"));
     assert_eq!(recipe.classic.laser_on_delay_ns, Some(-12_500));
-    let error = recipe::read("r.toml", "[[pen]]\nspeed = 3")
-        .unwrap_err()
-        .to_string();
-    assert_eq!(
-        error,
-        "r.toml:2: unknown key pen.speed, did you mean mark_speed_mm_s?"
-    );
+    let error = recipe::read("r.toml", "[[pen]]\nspeed = 3").unwrap_err().to_string();
+    assert_eq!(error, "r.toml:2: unknown key pen.speed, did you mean mark_speed_mm_s?");
 }

@@ -19,10 +19,7 @@ pub struct DoseMap {
 impl DoseMap {
     /// An empty map.
     pub fn new(pixel_mm: f64) -> Self {
-        Self {
-            pixel_mm,
-            tiles: BTreeMap::new(),
-        }
+        Self { pixel_mm, tiles: BTreeMap::new() }
     }
 
     /// Energy of pixel (i, j), J; zero where no tile is.
@@ -34,20 +31,14 @@ impl DoseMap {
     /// Adds energy to pixel (i, j), J.
     pub fn add(&mut self, i: i32, j: i32, energy_j: f32) {
         let (key, index) = tile_of(i, j);
-        let tile = self
-            .tiles
-            .entry(key)
-            .or_insert_with(|| Box::new([0.0; TILE_PIXELS * TILE_PIXELS]));
+        let tile =
+            self.tiles.entry(key).or_insert_with(|| Box::new([0.0; TILE_PIXELS * TILE_PIXELS]));
         tile[index] += energy_j;
     }
 
     /// All energy on the map, J.
     pub fn total_j(&self) -> f64 {
-        self.tiles
-            .values()
-            .flat_map(|tile| tile.iter())
-            .map(|&energy| f64::from(energy))
-            .sum()
+        self.tiles.values().flat_map(|tile| tile.iter()).map(|&energy| f64::from(energy)).sum()
     }
 }
 
@@ -55,8 +46,5 @@ impl DoseMap {
 pub fn tile_of(i: i32, j: i32) -> ((i32, i32), usize) {
     let side = TILE_PIXELS as i32;
     let key = (j.div_euclid(side), i.div_euclid(side));
-    (
-        key,
-        (j.rem_euclid(side) * side + i.rem_euclid(side)) as usize,
-    )
+    (key, (j.rem_euclid(side) * side + i.rem_euclid(side)) as usize)
 }

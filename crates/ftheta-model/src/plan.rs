@@ -96,10 +96,7 @@ pub struct SpeedProfile {
 impl PlanDraft {
     /// Number of samples.
     pub fn n_samples(&self) -> u64 {
-        self.segments
-            .iter()
-            .map(|segment| u64::from(segment.n_ticks))
-            .sum()
+        self.segments.iter().map(|segment| u64::from(segment.n_ticks)).sum()
     }
 }
 

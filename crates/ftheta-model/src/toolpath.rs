@@ -40,19 +40,13 @@ impl Mark {
 
     /// Length of the flattened curve, mm.
     pub fn length_mm(&self) -> f64 {
-        self.points
-            .windows(2)
-            .map(|pair| pair[0].distance(pair[1]))
-            .sum()
+        self.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
     }
 }
 
 impl Toolpath {
     /// Length of all jumps between marks, mm, without the way to the first and from the last.
     pub fn jump_length_mm(&self) -> f64 {
-        self.marks
-            .windows(2)
-            .map(|pair| pair[0].end().distance(pair[1].start()))
-            .sum()
+        self.marks.windows(2).map(|pair| pair[0].end().distance(pair[1].start())).sum()
     }
 }

@@ -63,9 +63,6 @@ impl From<TracePoint> for FieldPoint {
 impl From<FieldPoint> for TracePoint {
     /// Rounds to whole nanometres; a place beyond ±2.1 m is held there.
     fn from(point: FieldPoint) -> Self {
-        Self {
-            x_nm: (point.x_mm * 1e6).round() as i32,
-            y_nm: (point.y_mm * 1e6).round() as i32,
-        }
+        Self { x_nm: (point.x_mm * 1e6).round() as i32, y_nm: (point.y_mm * 1e6).round() as i32 }
     }
 }

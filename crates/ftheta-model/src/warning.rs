@@ -23,10 +23,7 @@ pub struct Imported<T> {
 impl Warning {
     /// A warning about `place`.
     pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self {
-            place: place.into(),
-            message: message.into(),
-        }
+        Self { place: place.into(), message: message.into() }
     }
 }
 

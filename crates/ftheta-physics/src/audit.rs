@@ -109,41 +109,18 @@ impl AuditError {
     pub fn fault(&self) -> (String, String, String) {
         match self {
             Self::Malformed { place, what } => (place.clone(), what.clone(), String::new()),
-            Self::Unreachable { place, x_mm, y_mm } => (
-                place.clone(),
-                format!("({x_mm:.3}, {y_mm:.3}) mm"),
-                "optics".into(),
-            ),
-            Self::Limit {
-                place,
-                value,
-                limit,
-                unit,
-                ..
-            } => (
-                place.clone(),
-                format!("{value} {unit}"),
-                format!("{limit} {unit}"),
-            ),
-            Self::Light {
-                place,
-                value_us,
-                limit_us,
-                ..
-            } => (
-                place.clone(),
-                format!("{value_us} µs"),
-                format!("{limit_us} µs"),
-            ),
-            Self::Power {
-                place,
-                value_w,
-                limit_w,
-            } => (
-                place.clone(),
-                format!("{value_w} W"),
-                format!("{limit_w} W"),
-            ),
+            Self::Unreachable { place, x_mm, y_mm } => {
+                (place.clone(), format!("({x_mm:.3}, {y_mm:.3}) mm"), "optics".into())
+            }
+            Self::Limit { place, value, limit, unit, .. } => {
+                (place.clone(), format!("{value} {unit}"), format!("{limit} {unit}"))
+            }
+            Self::Light { place, value_us, limit_us, .. } => {
+                (place.clone(), format!("{value_us} µs"), format!("{limit_us} µs"))
+            }
+            Self::Power { place, value_w, limit_w } => {
+                (place.clone(), format!("{value_w} W"), format!("{limit_w} W"))
+            }
             Self::Servo(error) => ("scanner.servo".into(), error.to_string(), String::new()),
         }
     }
@@ -201,11 +178,7 @@ impl Meter {
     ) -> Result<(), AuditError> {
         let where_ = || describe(draft, segment_index, self.n_samples);
         let angles = angles_from_field(&draft.machine.optics, place).ok_or_else(|| {
-            AuditError::Unreachable {
-                place: where_(),
-                x_mm: place.x_mm,
-                y_mm: place.y_mm,
-            }
+            AuditError::Unreachable { place: where_(), x_mm: place.x_mm, y_mm: place.y_mm }
         })?;
         let scanner = &draft.machine.scanner;
         let mut now = Limits::default();
@@ -221,9 +194,7 @@ impl Meter {
             now.speed = now.speed.max(speed_rad_s / scanner.speed_max_rad_s);
             now.voltage = now.voltage.max(voltage_v.abs() / scanner.voltage_max_v);
             now.current = now.current.max(current_a.abs() / scanner.current_max_a);
-            now.heat = now
-                .heat
-                .max(*heat / (scanner.current_rms_a * scanner.current_rms_a));
+            now.heat = now.heat.max(*heat / (scanner.current_rms_a * scanner.current_rms_a));
         }
         refuse(draft, &now, where_)?;
         self.n_samples += 1;
@@ -249,46 +220,16 @@ fn refuse(draft: &PlanDraft, now: &Limits, place: impl Fn() -> String) -> Result
     let scanner = &draft.machine.scanner;
     let free = 1.0 - CORRECTION_RESERVE;
     let rows = [
-        (
-            now.angle,
-            free,
-            "mirror angle",
-            scanner.angle_max_rad.to_degrees(),
-            "deg",
-        ),
-        (
-            now.speed,
-            free,
-            "mirror speed",
-            scanner.speed_max_rad_s,
-            "rad/s",
-        ),
-        (
-            now.voltage,
-            1.0,
-            "driver voltage",
-            scanner.voltage_max_v,
-            "V",
-        ),
+        (now.angle, free, "mirror angle", scanner.angle_max_rad.to_degrees(), "deg"),
+        (now.speed, free, "mirror speed", scanner.speed_max_rad_s, "rad/s"),
+        (now.voltage, 1.0, "driver voltage", scanner.voltage_max_v, "V"),
         (now.current, 1.0, "coil current", scanner.current_max_a, "A"),
-        (
-            now.heat,
-            1.0,
-            "coil heat",
-            scanner.current_rms_a * scanner.current_rms_a,
-            "A²",
-        ),
+        (now.heat, 1.0, "coil heat", scanner.current_rms_a * scanner.current_rms_a, "A²"),
     ];
     for (ratio, share, quantity, limit, unit) in rows {
         if ratio.is_nan() || ratio > share + ROUNDING {
             let (value, limit) = (ratio * limit, share * limit);
-            return Err(AuditError::Limit {
-                place: place(),
-                quantity,
-                value,
-                limit,
-                unit,
-            });
+            return Err(AuditError::Limit { place: place(), quantity, value, limit, unit });
         }
     }
     Ok(())

@@ -67,9 +67,7 @@ impl AxisLoop {
             sensor_error_rad,
             voltage_v: acting_v,
         };
-        self.pending_v = self
-            .gains
-            .voltage(&mut self.memory, reference_rad, &seen, self.tick_s);
+        self.pending_v = self.gains.voltage(&mut self.memory, reference_rad, &seen, self.tick_s);
         self.state = self.step.a * self.state + self.step.b * acting_v;
         acting_v
     }
@@ -81,13 +79,9 @@ impl AxisLoop {
         let voltage_v = voltage_v.clamp(-self.voltage_max_v, self.voltage_max_v);
         let free = self.current_row.dot(&self.state);
         let per_volt = self.step.b[CURRENT];
-        let (low, high) = (
-            (-self.current_max_a - free) / per_volt,
-            (self.current_max_a - free) / per_volt,
-        );
-        voltage_v
-            .clamp(low, high)
-            .clamp(-self.voltage_max_v, self.voltage_max_v)
+        let (low, high) =
+            ((-self.current_max_a - free) / per_volt, (self.current_max_a - free) / per_volt);
+        voltage_v.clamp(low, high).clamp(-self.voltage_max_v, self.voltage_max_v)
     }
 }
 
@@ -121,9 +115,5 @@ pub fn spectral_radius(plant: &Galvo, gains: &Gains, tick_s: f64) -> f64 {
             };
         }
     }
-    matrix
-        .complex_eigenvalues()
-        .iter()
-        .map(|value| value.norm())
-        .fold(0.0, f64::max)
+    matrix.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
 }

@@ -92,10 +92,7 @@ impl Galvo {
             kt / self.rotor_inertia,
             0.0, -emf, 0.0, -emf * rotor_q, -self.resistance / self.inductance,
         ]);
-        Step {
-            a,
-            b: State::new(0.0, 0.0, 0.0, 0.0, 1.0 / self.inductance),
-        }
+        Step { a, b: State::new(0.0, 0.0, 0.0, 0.0, 1.0 / self.inductance) }
     }
 
     /// Exact step over `duration_s` with the voltage held.
@@ -116,9 +113,6 @@ impl Galvo {
         }
         let e = m.exp();
         let scaled = |row: usize, column: usize| e[(row, column)] * units[row] / units[column];
-        Step {
-            a: SMatrix::from_fn(scaled),
-            b: State::from_fn(|row, _| scaled(row, 5)),
-        }
+        Step { a: SMatrix::from_fn(scaled), b: State::from_fn(|row, _| scaled(row, 5)) }
     }
 }

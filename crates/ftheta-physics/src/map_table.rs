@@ -67,13 +67,9 @@ impl MapTable {
         let (column, row) = (s as usize, t as usize);
         let (su, sv) = (hermite(s - column as f64), hermite(t - row as f64));
         let corner = row * (self.n_cells + 1) + column;
-        let [a, b, c, d] = [
-            corner,
-            corner + 1,
-            corner + self.n_cells + 1,
-            corner + self.n_cells + 2,
-        ]
-        .map(|index| &self.nodes[index]);
+        let [a, b, c, d] =
+            [corner, corner + 1, corner + self.n_cells + 1, corner + self.n_cells + 2]
+                .map(|index| &self.nodes[index]);
         let low = edge(a, b, su);
         let high = edge(c, d, su);
         Some([
@@ -87,12 +83,7 @@ impl MapTable {
 #[inline]
 fn hermite(s: f64) -> [f64; 4] {
     let r = 1.0 - s;
-    [
-        (1.0 + 2.0 * s) * r * r,
-        s * r * r,
-        s * s * (1.0 + 2.0 * r),
-        -(s * s) * r,
-    ]
+    [(1.0 + 2.0 * s) * r * r, s * r * r, s * s * (1.0 + 2.0 * r), -(s * s) * r]
 }
 
 /// First and second value along an edge in u, each with its slope by v.
@@ -115,12 +106,8 @@ fn node(
 ) -> Option<[f64; 8]> {
     // A twentieth of a cell: truncation falls with its fourth power and stays under rounding.
     const STEP: f64 = 0.05;
-    const WEIGHTS: [(f64, f64); 4] = [
-        (-2.0, 1.0 / 12.0),
-        (-1.0, -2.0 / 3.0),
-        (1.0, 2.0 / 3.0),
-        (2.0, -1.0 / 12.0),
-    ];
+    const WEIGHTS: [(f64, f64); 4] =
+        [(-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)];
     let at = |i: f64, j: f64| exact(u + i * STEP * cell, v + j * STEP * cell);
     let value = at(0.0, 0.0)?;
     let mut by = [[0.0; 3]; 2];

@@ -27,10 +27,9 @@ pub fn field_from_angles(optics: &Optics, angles: MirrorAngles) -> FieldPoint {
     };
     let (u, v) = match &optics.lens {
         Lens::FTheta { coefficients_mm } => ftheta_forward(coefficients_mm, first, second),
-        Lens::PostObjective {
-            mirror_distance_mm,
-            working_distance_mm,
-        } => post_forward(*mirror_distance_mm, *working_distance_mm, first, second),
+        Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
+            post_forward(*mirror_distance_mm, *working_distance_mm, first, second)
+        }
     };
     match optics.first_mirror {
         Axis::X => FieldPoint::new(u, v),
@@ -51,10 +50,9 @@ pub fn angles_from_field(optics: &Optics, place: FieldPoint) -> Option<MirrorAng
     };
     let (first, second) = match &optics.lens {
         Lens::FTheta { coefficients_mm } => ftheta_inverse(coefficients_mm, u, v)?,
-        Lens::PostObjective {
-            mirror_distance_mm,
-            working_distance_mm,
-        } => post_inverse(*mirror_distance_mm, *working_distance_mm, u, v),
+        Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
+            post_inverse(*mirror_distance_mm, *working_distance_mm, u, v)
+        }
     };
     Some(match optics.first_mirror {
         Axis::X => MirrorAngles::new(first, second),
@@ -67,10 +65,7 @@ pub fn angles_from_field(optics: &Optics, place: FieldPoint) -> Option<MirrorAng
 pub fn scale_mm_per_rad(optics: &Optics) -> f64 {
     match &optics.lens {
         Lens::FTheta { coefficients_mm } => 2.0 * coefficients_mm[0],
-        Lens::PostObjective {
-            working_distance_mm,
-            ..
-        } => 2.0 * working_distance_mm,
+        Lens::PostObjective { working_distance_mm, .. } => 2.0 * working_distance_mm,
     }
 }
 
@@ -130,17 +125,11 @@ fn ftheta_inverse(coefficients_mm: &[f64], u: f64, v: f64) -> Option<(f64, f64)>
 
 fn post_forward(e_mm: f64, d_mm: f64, first: f64, second: f64) -> (f64, f64) {
     let (sin2, cos2) = (2.0 * second).sin_cos();
-    (
-        (e_mm + d_mm / cos2) * (2.0 * first).tan(),
-        d_mm * sin2 / cos2,
-    )
+    ((e_mm + d_mm / cos2) * (2.0 * first).tan(), d_mm * sin2 / cos2)
 }
 
 fn post_inverse(e_mm: f64, d_mm: f64, u: f64, v: f64) -> (f64, f64) {
-    (
-        0.5 * (u / (e_mm + d_mm.hypot(v))).atan(),
-        0.5 * (v / d_mm).atan(),
-    )
+    (0.5 * (u / (e_mm + d_mm.hypot(v))).atan(), 0.5 * (v / d_mm).atan())
 }
 
 /// Length of the beam from mirror 1 to the work plane, less that to the centre, mm.
@@ -153,9 +142,8 @@ pub fn path_difference_mm(optics: &Optics, place: FieldPoint) -> f64 {
     };
     match &optics.lens {
         Lens::FTheta { .. } => 0.0,
-        Lens::PostObjective {
-            mirror_distance_mm: e,
-            working_distance_mm: d,
-        } => (e + d.hypot(v)).hypot(u) - (e + d),
+        Lens::PostObjective { mirror_distance_mm: e, working_distance_mm: d } => {
+            (e + d.hypot(v)).hypot(u) - (e + d)
+        }
     }
 }

@@ -135,12 +135,7 @@ impl Feed {
                 self.count(0);
                 self.count(u64::from(vertex));
             }
-            Motion::Travel {
-                first_vertex,
-                n_vertices,
-                profile,
-                interpolation,
-            } => {
+            Motion::Travel { first_vertex, n_vertices, profile, interpolation } => {
                 self.count(1);
                 self.count(u64::from(first_vertex));
                 self.count(u64::from(n_vertices));
@@ -155,13 +150,7 @@ impl Feed {
 
     /// The parts of the machine that decide what is sent and what it does; names do not count.
     fn machine(&mut self, machine: &Machine) {
-        let Machine {
-            name: _,
-            scanner,
-            optics,
-            laser,
-            output,
-        } = machine;
+        let Machine { name: _, scanner, optics, laser, output } = machine;
         for value in [
             scanner.rotor_inertia_kg_m2,
             scanner.mirror_inertia_kg_m2,
@@ -198,28 +187,17 @@ impl Feed {
             Lens::FTheta { coefficients_mm } => {
                 coefficients_mm.iter().for_each(|&value| self.number(value));
             }
-            Lens::PostObjective {
-                mirror_distance_mm,
-                working_distance_mm,
-            } => {
+            Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
                 self.number(*mirror_distance_mm);
                 self.number(*working_distance_mm);
             }
         }
         match scanner.servo {
-            Servo::StateFeedback {
-                velocity_weight_s,
-                lag_s,
-            } => {
+            Servo::StateFeedback { velocity_weight_s, lag_s } => {
                 self.number(velocity_weight_s);
                 self.number(lag_s);
             }
-            Servo::Pid {
-                bandwidth_hz,
-                damping,
-                integral_time_s,
-                current_bandwidth_hz,
-            } => {
+            Servo::Pid { bandwidth_hz, damping, integral_time_s, current_bandwidth_hz } => {
                 [bandwidth_hz, damping, integral_time_s, current_bandwidth_hz]
                     .iter()
                     .for_each(|&value| self.number(value));

@@ -91,18 +91,13 @@ impl Gains {
     pub fn design(scanner: &Scanner, tick_s: f64) -> Result<Self, ServoError> {
         let galvo = Galvo::new(scanner);
         match scanner.servo {
-            Servo::StateFeedback {
-                velocity_weight_s,
-                lag_s,
-            } => state_feedback(&galvo, tick_s, velocity_weight_s, lag_s),
+            Servo::StateFeedback { velocity_weight_s, lag_s } => {
+                state_feedback(&galvo, tick_s, velocity_weight_s, lag_s)
+            }
             Servo::Pid { .. } => {
                 let gains = Self::Pid(pid(&galvo, &scanner.servo));
                 let radius = crate::axis_loop::spectral_radius(&galvo, &gains, tick_s);
-                if radius < 1.0 {
-                    Ok(gains)
-                } else {
-                    Err(ServoError::Unstable { radius })
-                }
+                if radius < 1.0 { Ok(gains) } else { Err(ServoError::Unstable { radius }) }
             }
         }
     }
@@ -146,19 +141,11 @@ impl Gains {
 
 impl Memory {
     pub(crate) fn from_array([last_angle, current_integral, position_integral]: [f64; 3]) -> Self {
-        Self {
-            last_angle,
-            current_integral,
-            position_integral,
-        }
+        Self { last_angle, current_integral, position_integral }
     }
 
     pub(crate) fn to_array(self) -> [f64; 3] {
-        [
-            self.last_angle,
-            self.current_integral,
-            self.position_integral,
-        ]
+        [self.last_angle, self.current_integral, self.position_integral]
     }
 }
 
@@ -179,13 +166,7 @@ impl PidGains {
 /// Rigid-body design: the current loop's zero cancels the coil's pole, the position loop is a
 /// second-order system with the derivative on the measured angle.
 fn pid(galvo: &Galvo, servo: &Servo) -> PidGains {
-    let &Servo::Pid {
-        bandwidth_hz,
-        damping,
-        integral_time_s,
-        current_bandwidth_hz,
-    } = servo
-    else {
+    let &Servo::Pid { bandwidth_hz, damping, integral_time_s, current_bandwidth_hz } = servo else {
         return PidGains {
             proportional: 0.0,
             integral: 0.0,
@@ -243,13 +224,7 @@ fn regulator(galvo: &Galvo, tick_s: f64, velocity_weight_s: f64, rho: f64) -> Ga
     // Inside: mrad, so that cost and states are of the same order.
     const RAD_FROM_MRAD: f64 = 1e-3;
     let step = galvo.step(tick_s);
-    let unit = [
-        RAD_FROM_MRAD,
-        RAD_FROM_MRAD,
-        RAD_FROM_MRAD,
-        RAD_FROM_MRAD,
-        1.0,
-    ];
+    let unit = [RAD_FROM_MRAD, RAD_FROM_MRAD, RAD_FROM_MRAD, RAD_FROM_MRAD, 1.0];
     let mut a = Matrix6::zeros();
     for row in 0..5 {
         for column in 0..5 {

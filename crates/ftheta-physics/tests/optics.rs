@@ -17,12 +17,7 @@ fn reference() -> Value {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|number| number.as_f64().unwrap())
-        .collect()
+    value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
 fn rows(value: &Value) -> Vec<Vec<f64>> {
@@ -30,42 +25,22 @@ fn rows(value: &Value) -> Vec<Vec<f64>> {
 }
 
 fn lens(coefficients_mm: Vec<f64>, field_mm: f64) -> Optics {
-    Optics {
-        lens: Lens::FTheta { coefficients_mm },
-        first_mirror: Axis::X,
-        field_mm,
-    }
+    Optics { lens: Lens::FTheta { coefficients_mm }, first_mirror: Axis::X, field_mm }
 }
 
 fn post(case: &Value) -> Optics {
     let number = |key: &str| case[key].as_f64().unwrap();
-    let lens = Lens::PostObjective {
-        mirror_distance_mm: number("e"),
-        working_distance_mm: number("d"),
-    };
-    Optics {
-        lens,
-        first_mirror: Axis::X,
-        field_mm: 300.0,
-    }
+    let lens =
+        Lens::PostObjective { mirror_distance_mm: number("e"), working_distance_mm: number("d") };
+    Optics { lens, first_mirror: Axis::X, field_mm: 300.0 }
 }
 
 /// Forward to 1e-9 mm and back to 1e-12 rad over all rows of a case.
 fn check_case(optics: &Optics, case: &Value) {
     for (alpha, xy) in rows(&case["alpha"]).iter().zip(rows(&case["xy"])) {
         let place = field_from_angles(optics, MirrorAngles::new(alpha[0], alpha[1]));
-        assert!(
-            (place.x_mm - xy[0]).abs() < 1e-9,
-            "x {} against {}",
-            place.x_mm,
-            xy[0]
-        );
-        assert!(
-            (place.y_mm - xy[1]).abs() < 1e-9,
-            "y {} against {}",
-            place.y_mm,
-            xy[1]
-        );
+        assert!((place.x_mm - xy[0]).abs() < 1e-9, "x {} against {}", place.x_mm, xy[0]);
+        assert!((place.y_mm - xy[1]).abs() < 1e-9, "y {} against {}", place.y_mm, xy[1]);
         let angles = angles_from_field(optics, place).unwrap();
         assert!((angles.x_rad - alpha[0]).abs() < 1e-12);
         assert!((angles.y_rad - alpha[1]).abs() < 1e-12);
@@ -122,15 +97,10 @@ fn published_mirror_angles_are_met() {
                 greatest[1] = greatest[1].max(angles.y_rad.to_degrees());
             }
         }
-        for (found, key) in greatest
-            .iter()
-            .zip(["mirror1_deg_published", "mirror2_deg_published"])
+        for (found, key) in greatest.iter().zip(["mirror1_deg_published", "mirror2_deg_published"])
         {
             let published = case[key].as_f64().unwrap();
-            assert!(
-                (found - published).abs() < 0.0006,
-                "{found} against {published}"
-            );
+            assert!((found - published).abs() < 0.0006, "{found} against {published}");
         }
     }
 }
@@ -138,10 +108,7 @@ fn published_mirror_angles_are_met() {
 #[test]
 fn first_mirror_swaps_the_roles() {
     let x_first = lens(F163.into(), 121.0);
-    let y_first = Optics {
-        first_mirror: Axis::Y,
-        ..x_first.clone()
-    };
+    let y_first = Optics { first_mirror: Axis::Y, ..x_first.clone() };
     let a = field_from_angles(&x_first, MirrorAngles::new(0.1, 0.15));
     let b = field_from_angles(&y_first, MirrorAngles::new(0.15, 0.1));
     assert_eq!((a.x_mm, a.y_mm), (b.y_mm, b.x_mm));
@@ -175,23 +142,11 @@ fn inverse_table(optics: &Optics) -> MapTable {
 
 #[test]
 fn inverse_table_is_within_a_nanometre() {
-    let post = Lens::PostObjective {
-        mirror_distance_mm: 12.0,
-        working_distance_mm: 180.0,
-    };
-    let post = Optics {
-        lens: post,
-        first_mirror: Axis::Y,
-        field_mm: 110.0,
-    };
+    let post = Lens::PostObjective { mirror_distance_mm: 12.0, working_distance_mm: 180.0 };
+    let post = Optics { lens: post, first_mirror: Axis::Y, field_mm: 110.0 };
     let ideal = lens(vec![160.0], 120.0);
-    let all = [
-        lens(F163.into(), 121.0),
-        lens(F255.into(), 202.0),
-        lens(F420.into(), 336.0),
-        ideal,
-        post,
-    ];
+    let all =
+        [lens(F163.into(), 121.0), lens(F255.into(), 202.0), lens(F420.into(), 336.0), ideal, post];
     for optics in all {
         let table = inverse_table(&optics);
         let mut runner = proptest::test_runner::TestRunner::deterministic();
@@ -221,10 +176,8 @@ fn forward_table_is_within_twenty_nanometres() {
         let table = MapTable::new(0.24, 0.0, exact).unwrap();
         let mut worst_nm = 0.0_f64;
         for i in 0..40_000 {
-            let (x, y) = (
-                0.23 * (f64::from(i) * 0.618).sin(),
-                0.23 * (f64::from(i) * 0.7549).cos(),
-            );
+            let (x, y) =
+                (0.23 * (f64::from(i) * 0.618).sin(), 0.23 * (f64::from(i) * 0.7549).cos());
             for scale in [1.0, 0.01] {
                 let read = table.value(scale * x, scale * y).unwrap();
                 let [x_mm, y_mm] = exact(scale * x, scale * y).unwrap();

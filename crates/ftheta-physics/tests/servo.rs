@@ -48,13 +48,7 @@ fn scanner(set: &str, servo: Servo) -> Scanner {
 
 fn preset(set: &str) -> Scanner {
     let &(_, velocity_weight_s, lag_s, _) = SETS.iter().find(|row| row.0 == set).unwrap();
-    scanner(
-        set,
-        Servo::StateFeedback {
-            velocity_weight_s,
-            lag_s,
-        },
-    )
+    scanner(set, Servo::StateFeedback { velocity_weight_s, lag_s })
 }
 
 fn axis(scanner: &Scanner) -> (AxisLoop, Galvo) {
@@ -68,13 +62,8 @@ fn voltage_weight_and_lag_are_the_prototypes() {
     for (set, _, lag_s, rho_found) in SETS {
         let scanner = preset(set);
         let gains = Gains::design(&scanner, TICK_S).unwrap();
-        let Gains::StateFeedback { rho, .. } = gains else {
-            panic!("state feedback")
-        };
-        assert!(
-            (rho / rho_found - 1.0).abs() < 2e-3,
-            "{set}: rho {rho}, prototype {rho_found}"
-        );
+        let Gains::StateFeedback { rho, .. } = gains else { panic!("state feedback") };
+        assert!((rho / rho_found - 1.0).abs() < 2e-3, "{set}: rho {rho}, prototype {rho_found}");
         assert!((gains.lag_s(&Galvo::new(&scanner)) - lag_s).abs() < 1e-12);
         assert!(spectral_radius(&Galvo::new(&scanner), &gains, TICK_S) < 1.0);
     }
@@ -104,11 +93,7 @@ fn small_step_overshoots_little() {
                 plant.mirror_row().dot(axis.state())
             })
             .fold(0.0, f64::max);
-        assert!(
-            peak <= 1.006e-4,
-            "{set}: overshoot {:.3} %",
-            (peak / 1e-4 - 1.0) * 100.0
-        );
+        assert!(peak <= 1.006e-4, "{set}: overshoot {:.3} %", (peak / 1e-4 - 1.0) * 100.0);
     }
 }
 
@@ -133,10 +118,9 @@ fn response(scanner: &Scanner, frequency_hz: f64) -> (f64, f64) {
 #[test]
 fn response_at_circle_frequencies_is_the_regulators() {
     let scanner = preset("S10");
-    for (radius_mm, speed_mm_s, gain, phase_deg) in [
-        (0.5, 1000.0, 0.990_326, -18.7708),
-        (0.5, 2000.0, 0.962_734, -37.2890),
-    ] {
+    for (radius_mm, speed_mm_s, gain, phase_deg) in
+        [(0.5, 1000.0, 0.990_326, -18.7708), (0.5, 2000.0, 0.962_734, -37.2890)]
+    {
         let found = response(&scanner, speed_mm_s / (TAU * radius_mm));
         assert!((found.0 - gain).abs() < 2e-6, "gain {}", found.0);
         assert!((found.1 - phase_deg).abs() < 5e-4, "phase {}", found.1);
@@ -174,15 +158,8 @@ fn reference_bang_bang_arcs_end_at_rest() {
                 state = step.a * state + step.b * (sign.as_f64().unwrap() * voltage);
             }
             let target = step_deg.parse::<f64>().unwrap().to_radians();
-            assert!(
-                (state[0] - target).abs() < 1e-9,
-                "{set} {step_deg}: ends at {}",
-                state[0]
-            );
-            assert!(
-                state[1].abs() < 1e-4 && state[2].abs() < 1e-9,
-                "{set} {step_deg}: {state}"
-            );
+            assert!((state[0] - target).abs() < 1e-9, "{set} {step_deg}: ends at {}", state[0]);
+            assert!(state[1].abs() < 1e-4 && state[2].abs() < 1e-9, "{set} {step_deg}: {state}");
         }
     }
 }
@@ -238,10 +215,7 @@ fn pid_servo_is_stable_and_follows() {
 
 #[test]
 fn impossible_servos_are_errors() {
-    let fast = Servo::StateFeedback {
-        velocity_weight_s: 70e-6,
-        lag_s: 1e-6,
-    };
+    let fast = Servo::StateFeedback { velocity_weight_s: 70e-6, lag_s: 1e-6 };
     let error = Gains::design(&scanner("S10", fast), TICK_S).unwrap_err();
     assert!(matches!(error, ServoError::Lag { .. }), "{error}");
     let wild = Servo::Pid {

@@ -32,12 +32,7 @@ pub fn plan(
     settings: &Settings,
     tolerance_mm: f64,
 ) -> Result<Plan, PlanError> {
-    Ok(Plan::new(draft(
-        toolpath,
-        machine,
-        settings,
-        tolerance_mm,
-    )?)?)
+    Ok(Plan::new(draft(toolpath, machine, settings, tolerance_mm)?)?)
 }
 
 /// The plan's content before the audit; see [`plan`].
@@ -54,16 +49,8 @@ pub fn draft(
         return Err(PlanError::Empty);
     }
     settings.check(machine)?;
-    toolpath
-        .pens
-        .iter()
-        .try_for_each(|pen| settings::check_pen(pen, machine))?;
-    let n_vertices = toolpath
-        .marks
-        .iter()
-        .map(|mark| mark.points.len())
-        .sum::<usize>()
-        + 2;
+    toolpath.pens.iter().try_for_each(|pen| settings::check_pen(pen, machine))?;
+    let n_vertices = toolpath.marks.iter().map(|mark| mark.points.len()).sum::<usize>() + 2;
     let mut builder = Builder {
         machine,
         settings,
@@ -115,11 +102,7 @@ impl Builder<'_> {
     /// Stays on the last vertex for the whole ticks in `time_s`.
     fn hold(&mut self, mark_index: Option<u32>, time_s: f64) -> Result<(), PlanError> {
         let vertex = self.last_vertex();
-        self.push(
-            mark_index,
-            (time_s / self.period_s).round(),
-            Motion::Hold { vertex },
-        )
+        self.push(mark_index, (time_s / self.period_s).round(), Motion::Hold { vertex })
     }
 
     fn push(
@@ -133,17 +116,9 @@ impl Builder<'_> {
         }
         if n_ticks > f64::from(u32::MAX) {
             let place = mark_index.map_or("jump".into(), |index| format!("mark {index}"));
-            return Err(PlanError::TooLong {
-                place,
-                value: n_ticks,
-                limit: u32::MAX,
-            });
+            return Err(PlanError::TooLong { place, value: n_ticks, limit: u32::MAX });
         }
-        self.segments.push(Segment {
-            mark_index,
-            n_ticks: n_ticks as u32,
-            motion,
-        });
+        self.segments.push(Segment { mark_index, n_ticks: n_ticks as u32, motion });
         self.n_samples += n_ticks as u64;
         Ok(())
     }
@@ -192,10 +167,7 @@ impl Builder<'_> {
     fn mark(&mut self, mark: Mark, pen: &Pen) -> Result<(), PlanError> {
         let mark_index = Some(self.marks.len() as u32);
         let start_s = self.now_s();
-        let mut run = Run {
-            first_vertex: self.last_vertex(),
-            length_mm: 0.0,
-        };
+        let mut run = Run { first_vertex: self.last_vertex(), length_mm: 0.0 };
         let mut end_s = start_s;
         let points = &mark.points;
         for index in 1..points.len() {
@@ -203,8 +175,7 @@ impl Builder<'_> {
             self.vertices.push(points[index]);
             let wait_s = match points.get(index + 1) {
                 Some(&next) => {
-                    self.settings
-                        .polygon_delay_for_s(points[index - 1], points[index], next)
+                    self.settings.polygon_delay_for_s(points[index - 1], points[index], next)
                 }
                 None => f64::INFINITY,
             };
@@ -224,18 +195,9 @@ impl Builder<'_> {
             if wait_s.is_finite() {
                 // A controller counts whole ticks, so what is left over is dropped.
                 let n_ticks = (wait_s / self.period_s + 1e-6).floor();
-                self.push(
-                    mark_index,
-                    n_ticks,
-                    Motion::Hold {
-                        vertex: last_vertex,
-                    },
-                )?;
+                self.push(mark_index, n_ticks, Motion::Hold { vertex: last_vertex })?;
             }
-            run = Run {
-                first_vertex: last_vertex,
-                length_mm: 0.0,
-            };
+            run = Run { first_vertex: last_vertex, length_mm: 0.0 };
         }
         self.push_light(mark, pen, start_s, end_s)
     }

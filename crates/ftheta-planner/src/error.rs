@@ -77,38 +77,18 @@ impl PlanError {
     pub fn fault(&self) -> (String, String, String) {
         match self {
             Self::Empty => ("toolpath".into(), "0 marks".into(), "1 mark".into()),
-            Self::Setting {
-                place,
-                quantity,
-                value,
-                low,
-                high,
-                unit,
-            } => (
+            Self::Setting { place, quantity, value, low, high, unit } => (
                 format!("{place}: {quantity}"),
                 format!("{value} {unit}"),
                 format!("{low} to {high} {unit}"),
             ),
-            Self::TooLong {
-                place,
-                value,
-                limit,
-            } => (place.clone(), value.to_string(), limit.to_string()),
-            Self::EdgesOverlap {
-                mark,
-                origin,
-                value_us,
-            } => (
-                format!("mark {mark} ({origin})"),
-                format!("{value_us} µs"),
-                "0 µs".into(),
-            ),
-            Self::EdgesReversed {
-                mark,
-                origin,
-                on_us,
-                off_us,
-            } => (
+            Self::TooLong { place, value, limit } => {
+                (place.clone(), value.to_string(), limit.to_string())
+            }
+            Self::EdgesOverlap { mark, origin, value_us } => {
+                (format!("mark {mark} ({origin})"), format!("{value_us} µs"), "0 µs".into())
+            }
+            Self::EdgesReversed { mark, origin, on_us, off_us } => (
                 format!("mark {mark} ({origin})"),
                 format!("on {on_us} µs, off {off_us} µs"),
                 "0 <= on <= off".into(),

@@ -61,21 +61,9 @@ impl<'a> Renderer<'a> {
             let angles = angles_from_field(optics, FieldPoint::new(x, y))?;
             Some([angles.x_rad, angles.y_rad])
         });
-        let words = Words {
-            plan,
-            table,
-            words_per_rad: 1.0 / output.word_step_rad(),
-        };
+        let words = Words { plan, table, words_per_rad: 1.0 / output.word_step_rad() };
         let cursor = Cursor::at(&plan.vertices, 0);
-        Self {
-            plan,
-            words,
-            segment_index: 0,
-            n_rendered: 0,
-            cursor,
-            next_index: 0,
-            n_edges: 0,
-        }
+        Self { plan, words, segment_index: 0, n_rendered: 0, cursor, next_index: 0, n_edges: 0 }
     }
 
     /// Fills `block` with what comes next; `false` after the end.
@@ -113,22 +101,13 @@ impl<'a> Renderer<'a> {
                 let word = self.words.at(self.plan.vertices[vertex as usize]);
                 words.resize(words.len() + (end + 1 - first) as usize, word);
             }
-            Motion::Travel {
-                profile,
-                interpolation: Interpolation::Dda,
-                ..
-            } => {
+            Motion::Travel { profile, interpolation: Interpolation::Dda, .. } => {
                 let (start, step) = self.dda(&profile, n_ticks);
                 for tick in first..=end {
                     words.push(self.words.at(start + step * f64::from(tick)));
                 }
             }
-            Motion::Travel {
-                first_vertex,
-                n_vertices,
-                profile,
-                ..
-            } => {
+            Motion::Travel { first_vertex, n_vertices, profile, .. } => {
                 let last = (first_vertex + n_vertices) as usize - 1;
                 let constant = profile.acceleration_mm_s2 == f64::INFINITY
                     && profile.deceleration_mm_s2 == f64::INFINITY;
@@ -167,15 +146,9 @@ impl<'a> Renderer<'a> {
         let end_ns = self.next_index * u64::from(self.plan.machine.output.period_ns);
         while let Some(mark) = self.plan.marks.get(self.n_edges / 2) {
             let edge = if self.n_edges.is_multiple_of(2) {
-                LaserEdge {
-                    time_ns: mark.on_ns,
-                    power_w: mark.power_w,
-                }
+                LaserEdge { time_ns: mark.on_ns, power_w: mark.power_w }
             } else {
-                LaserEdge {
-                    time_ns: mark.off_ns,
-                    power_w: 0.0,
-                }
+                LaserEdge { time_ns: mark.off_ns, power_w: 0.0 }
             };
             if edge.time_ns >= end_ns {
                 break;
@@ -188,13 +161,8 @@ impl<'a> Renderer<'a> {
 
 impl Cursor {
     fn at(vertices: &[Point], leg: usize) -> Self {
-        let mut cursor = Self {
-            leg,
-            start_mm: 0.0,
-            end_mm: 0.0,
-            from: vertices[leg],
-            direction: Vec2::ZERO,
-        };
+        let mut cursor =
+            Self { leg, start_mm: 0.0, end_mm: 0.0, from: vertices[leg], direction: Vec2::ZERO };
         cursor.enter(vertices);
         cursor
     }
@@ -202,16 +170,10 @@ impl Cursor {
     /// Sets the leg's own values; the leg after the last vertex has no length.
     fn enter(&mut self, vertices: &[Point]) {
         self.from = vertices[self.leg];
-        let along = vertices
-            .get(self.leg + 1)
-            .map_or(Vec2::ZERO, |&to| to - self.from);
+        let along = vertices.get(self.leg + 1).map_or(Vec2::ZERO, |&to| to - self.from);
         let length_mm = along.hypot();
         self.end_mm = self.start_mm + length_mm;
-        self.direction = if length_mm > 0.0 {
-            along / length_mm
-        } else {
-            Vec2::ZERO
-        };
+        self.direction = if length_mm > 0.0 { along / length_mm } else { Vec2::ZERO };
     }
 
     /// The place at `distance_mm` along the path; distances never fall.
@@ -230,10 +192,7 @@ impl Words<'_> {
     /// The word pair for a place.
     #[inline]
     fn at(&self, place: Point) -> DacCodes {
-        let tabled = self
-            .table
-            .as_ref()
-            .and_then(|table| table.value(place.x, place.y));
+        let tabled = self.table.as_ref().and_then(|table| table.value(place.x, place.y));
         let [x_rad, y_rad] = tabled.unwrap_or_else(|| self.exact(place));
         DacCodes {
             x: (x_rad * self.words_per_rad).round_ties_even() as i32,

@@ -20,10 +20,7 @@ fn main() {
 
 /// Marks one after the other at 1 m/s, each lit from end to end with an error of some µm.
 fn scene(curves: &[BezPath]) -> (PlanDraft, Trace) {
-    let mut trace = Trace {
-        step_ns: STEP_NS,
-        ..Trace::default()
-    };
+    let mut trace = Trace { step_ns: STEP_NS, ..Trace::default() };
     let mut marks = Vec::new();
     'marks: for index in 0.. {
         let curve = &curves[index % curves.len()];
@@ -121,16 +118,11 @@ fn machine() -> Machine {
             speed_max_rad_s: 1000.0,
             f1_uncertainty: 0.03,
             kt_uncertainty: 0.005,
-            servo: Servo::StateFeedback {
-                velocity_weight_s: 7e-5,
-                lag_s: 1.6e-4,
-            },
+            servo: Servo::StateFeedback { velocity_weight_s: 7e-5, lag_s: 1.6e-4 },
             sensor: Sensor::default(),
         },
         optics: Optics {
-            lens: Lens::FTheta {
-                coefficients_mm: vec![160.0],
-            },
+            lens: Lens::FTheta { coefficients_mm: vec![160.0] },
             first_mirror: Axis::Y,
             field_mm: 120.0,
         },

@@ -90,11 +90,7 @@ impl Contour {
     /// How far `beam` is outside the start: positive before it, negative past it, along the curve.
     pub fn before_start_mm(&self, beam: Point, foot: Foot) -> f64 {
         let along_mm = self.tangent(0).dot(self.points[0] - beam);
-        if foot.at_mm <= 0.0 && !self.closed {
-            along_mm.max(0.0)
-        } else {
-            -foot.at_mm
-        }
+        if foot.at_mm <= 0.0 && !self.closed { along_mm.max(0.0) } else { -foot.at_mm }
     }
 
     /// How far `beam` is past the end: positive beyond it, negative short of it, along the curve.
@@ -110,11 +106,7 @@ impl Contour {
 
     /// The point nearest to `beam` around the start, for a beam `off_mm` from there.
     pub fn nearest_to_start(&self, beam: Point, off_mm: f64) -> Foot {
-        let start = Foot {
-            at_mm: 0.0,
-            distance_mm: off_mm,
-            segment: 0,
-        };
+        let start = Foot { at_mm: 0.0, distance_mm: off_mm, segment: 0 };
         self.nearest(beam, start, 0.0)
     }
 
@@ -127,13 +119,8 @@ impl Contour {
         let length_mm = self.length_mm();
         let expected_mm = before.at_mm + ahead_mm;
         let mut reach_mm = REACH_MM + 4.0 * before.distance_mm;
-        let mut query = Query {
-            beam,
-            expected_mm,
-            shift_mm: 0.0,
-            cost: f64::INFINITY,
-            foot: before,
-        };
+        let mut query =
+            Query { beam, expected_mm, shift_mm: 0.0, cost: f64::INFINITY, foot: before };
         if !self.closed {
             self.search(&mut query, reach_mm, before.segment);
             return query.foot;
@@ -169,9 +156,7 @@ impl Contour {
             }
         }
         if n <= 3 {
-            (0..n)
-                .filter(|&i| !outside(i, i + 1))
-                .for_each(|i| self.look_at(i, query));
+            (0..n).filter(|&i| !outside(i, i + 1)).for_each(|i| self.look_at(i, query));
             return;
         }
         let mut stack = [(0usize, 0usize, 0usize); 64];
@@ -184,9 +169,7 @@ impl Contour {
                 continue;
             }
             if hi - lo <= LEAF {
-                (lo..hi)
-                    .filter(|&i| !outside(i, i + 1))
-                    .for_each(|i| self.look_at(i, query));
+                (lo..hi).filter(|&i| !outside(i, i + 1)).for_each(|i| self.look_at(i, query));
                 continue;
             }
             let middle = lo + (hi - lo) / 2;
@@ -210,11 +193,7 @@ impl Contour {
         let cost = distance_sq + TIE_WEIGHT * ahead_mm * ahead_mm;
         if cost < query.cost {
             query.cost = cost;
-            query.foot = Foot {
-                at_mm,
-                distance_mm: distance_sq.sqrt(),
-                segment: i,
-            };
+            query.foot = Foot { at_mm, distance_mm: distance_sq.sqrt(), segment: i };
         }
     }
 

@@ -26,10 +26,7 @@ pub struct PlateOptions {
 impl Default for PlateOptions {
     /// The marks and a margin, 2 000 pixels.
     fn default() -> Self {
-        Self {
-            page_mm: None,
-            longest_side_px: 2000,
-        }
+        Self { page_mm: None, longest_side_px: 2000 }
     }
 }
 
@@ -43,10 +40,8 @@ pub fn plate_png(dose: &DoseMap, options: &PlateOptions) -> Vec<u8> {
     let area_mm = shown_area(dose, typical_j, options.page_mm);
     let scene = Scene::new(area_mm, options.longest_side_px);
     let response = response(dose, typical_j, &scene);
-    let mut canvas = Canvas {
-        width: scene.width,
-        pixels: vec![GROUND; scene.width * scene.height],
-    };
+    let mut canvas =
+        Canvas { width: scene.width, pixels: vec![GROUND; scene.width * scene.height] };
     for y in 0..scene.height {
         for x in 0..scene.width {
             let plate = scene.plate_at(x, y, &response);
@@ -97,10 +92,7 @@ impl Scene {
     /// Brightness that the plate gives a pixel, and the share of the ground that is seen.
     fn plate_at(&self, x: usize, y: usize, response: &[f32]) -> (f32, f32) {
         let (w, h) = (self.plate_width as f32, self.plate_height as f32);
-        let (px, py) = (
-            x as f32 - self.border as f32 + 0.5,
-            y as f32 - self.border as f32 + 0.5,
-        );
+        let (px, py) = (x as f32 - self.border as f32 + 0.5, y as f32 - self.border as f32 + 0.5);
         let unit = self.width.max(self.height) as f32;
         let edge = rounded_distance(px, py, w, h, 0.012 * unit);
         let lift = 0.006 * unit;
@@ -122,7 +114,8 @@ impl Scene {
         let plate = PLATE * light * (1.0 + 0.22 * (brush - 0.5)) + bevel;
         let inside = px >= 0.0 && py >= 0.0 && px < w && py < h;
         let marked = match inside {
-            true => response[py as usize * self.plate_width + px as usize].min(1.0),
+            // The eye opens up for fine lines, so a part of a pixel counts more than its share.
+            true => response[py as usize * self.plate_width + px as usize].min(1.0).powf(0.7),
             false => 0.0,
         };
         let grain = noise(px * 0.45, py * 0.45, 4);
@@ -188,12 +181,10 @@ fn response(dose: &DoseMap, typical_j: f32, scene: &Scene) -> Vec<f32> {
     for (key, tile) in &dose.tiles {
         let x_px = |x_mm: f64| (x_mm - scene.left_mm) / scene.pixel_mm;
         let y_px = |y_mm: f64| (scene.top_mm - y_mm) / scene.pixel_mm;
-        let columns: Vec<_> = (0..side)
-            .map(|i| across(key.1 * side + i, scene.plate_width, &x_px))
-            .collect();
-        let rows: Vec<_> = (0..side)
-            .map(|j| across(key.0 * side + j, scene.plate_height, &y_px))
-            .collect();
+        let columns: Vec<_> =
+            (0..side).map(|i| across(key.1 * side + i, scene.plate_width, &x_px)).collect();
+        let rows: Vec<_> =
+            (0..side).map(|j| across(key.0 * side + j, scene.plate_height, &y_px)).collect();
         for (at, &energy_j) in tile.iter().enumerate() {
             let over = energy_j / typical_j - THRESHOLD;
             if over <= 0.0 {
@@ -216,11 +207,7 @@ fn response(dose: &DoseMap, typical_j: f32, scene: &Scene) -> Vec<f32> {
 /// Shares that picture pixels take of a map pixel around `centre_px`: by overlap where map pixels
 /// are smaller, linearly interpolated where they are larger. First pixel, and shares from there on.
 fn spread(centre_px: f64, size_px: f64, n: usize) -> (usize, Vec<f32>) {
-    let reach_px = if size_px > 1.0 {
-        size_px
-    } else {
-        0.5 * size_px
-    };
+    let reach_px = if size_px > 1.0 { size_px } else { 0.5 * size_px };
     let first = (centre_px - reach_px).floor().max(0.0) as usize;
     let end = ((centre_px + reach_px).ceil().max(0.0) as usize).min(n);
     let share = |k: usize| {
@@ -265,10 +252,8 @@ fn draw_scale(canvas: &mut Canvas, scene: &Scene) {
     let longest_mm = 0.22 * scene.plate_width as f64 * scene.pixel_mm;
     let power = 10f64.powf(longest_mm.log10().floor());
     let steps = [5.0, 2.0, 1.0].into_iter();
-    let length_mm = steps
-        .map(|step| step * power)
-        .find(|length_mm| *length_mm <= longest_mm)
-        .unwrap_or(power);
+    let length_mm =
+        steps.map(|step| step * power).find(|length_mm| *length_mm <= longest_mm).unwrap_or(power);
     let length_px = length_mm / scene.pixel_mm;
     let right = (scene.border + scene.plate_width) as f64;
     let y = scene.height as f64 - 0.026 * unit_px;
@@ -319,9 +304,7 @@ fn encode(canvas: &Canvas) -> Vec<u8> {
     encoder.set_palette(palette());
     encoder.set_filter(png::Filter::NoFilter);
     encoder.set_compression(png::Compression::Balanced);
-    let written = encoder
-        .write_header()
-        .and_then(|mut writer| writer.write_image_data(&shades));
+    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&shades));
     written.expect("writing to memory does not fail, and the sizes agree");
     bytes
 }

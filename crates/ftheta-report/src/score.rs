@@ -166,11 +166,7 @@ impl<'a> Scorer<'a> {
     /// The figures. Light beyond the last point is taken to stand still there.
     pub fn finish(mut self) -> Score {
         if let Some(point) = self.last.take() {
-            let still = Trace {
-                step_ns: u64::MAX,
-                points: vec![point],
-                ..Trace::default()
-            };
+            let still = Trace { step_ns: u64::MAX, points: vec![point], ..Trace::default() };
             while let Some(light) = self.waiting.pop_front() {
                 self.shine(&still, light);
             }
@@ -188,10 +184,7 @@ impl<'a> Scorer<'a> {
             self.tally.take_stray(energy_j);
             return;
         };
-        let beam = BeamAt {
-            trace,
-            last: self.last,
-        };
+        let beam = BeamAt { trace, last: self.last };
         let mut at_ns = light.on_ns;
         let track = self
             .track
@@ -232,10 +225,7 @@ impl BeamAt<'_> {
         if past_ns == 0 {
             return from;
         }
-        from.lerp(
-            self.point(index + 1),
-            past_ns as f64 / self.trace.step_ns as f64,
-        )
+        from.lerp(self.point(index + 1), past_ns as f64 / self.trace.step_ns as f64)
     }
 
     fn point(&self, index: u64) -> Point {

@@ -142,16 +142,9 @@ impl Tally {
         }
         let (error_mm, at) = track.worst;
         let error_um = 1e3 * error_mm;
-        let place = self
-            .worst_marks
-            .partition_point(|other| other.error_um >= error_um);
+        let place = self.worst_marks.partition_point(|other| other.error_um >= error_um);
         if place < N_WORST_MARKS {
-            let mark = MarkError {
-                mark_index: track.mark_index,
-                error_um,
-                x_mm: at.x,
-                y_mm: at.y,
-            };
+            let mark = MarkError { mark_index: track.mark_index, error_um, x_mm: at.x, y_mm: at.y };
             self.worst_marks.insert(place, mark);
             self.worst_marks.truncate(N_WORST_MARKS);
         }
@@ -160,10 +153,8 @@ impl Tally {
     /// The figures.
     pub fn score(mut self) -> Score {
         let time_s = self.contour_um.total();
-        let tail = |histogram: &Histogram| Tail {
-            max: histogram.max(),
-            p99: histogram.percentile(0.99),
-        };
+        let tail =
+            |histogram: &Histogram| Tail { max: histogram.max(), p99: histogram.percentile(0.99) };
         let n_windows = self.dose.total();
         let dose_ratio = (n_windows > 0.0).then(|| DoseRatio {
             min: self.dose.min(),
@@ -171,9 +162,7 @@ impl Tally {
             p99: self.dose.percentile(0.99),
             max: self.dose.max(),
         });
-        self.dose_bars
-            .iter_mut()
-            .for_each(|bar| *bar /= n_windows.max(1.0));
+        self.dose_bars.iter_mut().for_each(|bar| *bar /= n_windows.max(1.0));
         let (on_ns, off_ns) = self.light_ns.unwrap_or_default();
         Score {
             contour_error_um: ContourError {
@@ -203,14 +192,7 @@ impl Tally {
 
 impl ErrorMap {
     fn take(&mut self, beam: Point, error_um: f64, way_mm: f64) {
-        self.worst = worse(
-            self.worst,
-            ErrorSample {
-                x_mm: beam.x,
-                y_mm: beam.y,
-                error_um,
-            },
-        );
+        self.worst = worse(self.worst, ErrorSample { x_mm: beam.x, y_mm: beam.y, error_um });
         self.length_mm += way_mm;
         if self.length_mm >= ERROR_SAMPLE_MM {
             self.end_mark();

@@ -40,9 +40,7 @@ impl MarkTrack {
         let laser = &plan.machine.laser;
         let pen = plan.pens.get(mark.pen_index);
         let speed_mm_s = pen.map_or(f64::INFINITY, |pen| pen.mark_speed_mm_s);
-        let pitch_mm = laser
-            .pulse_khz
-            .map_or(0.0, |pulse_khz| speed_mm_s / (1e3 * pulse_khz));
+        let pitch_mm = laser.pulse_khz.map_or(0.0, |pulse_khz| speed_mm_s / (1e3 * pulse_khz));
         let window_mm = laser.spot_diameter_mm.max(2.0 * pitch_mm);
         let step_mm = STEP_MM.max(contour.length_mm() / N_SAMPLES_MAX);
         let start = contour.samples(0.0, 1).next();

@@ -31,9 +31,7 @@ fn map(pixel_mm: f64) -> DoseMap {
 }
 
 fn size_px(png: &[u8]) -> (u32, u32) {
-    let reader = png::Decoder::new(std::io::Cursor::new(png))
-        .read_info()
-        .unwrap();
+    let reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     (reader.info().width, reader.info().height)
 }
 
@@ -41,16 +39,10 @@ fn size_px(png: &[u8]) -> (u32, u32) {
 fn the_longest_side_is_as_asked() {
     let dose = map(0.02);
     for longest_side_px in [300, 1000] {
-        let options = PlateOptions {
-            page_mm: Some([30.0, 40.0]),
-            longest_side_px,
-        };
+        let options = PlateOptions { page_mm: Some([30.0, 40.0]), longest_side_px };
         let png = plate_png(&dose, &options);
         let (width, height) = size_px(&png);
-        assert!(
-            width.max(height).abs_diff(longest_side_px) <= 2,
-            "{width} {height}"
-        );
+        assert!(width.max(height).abs_diff(longest_side_px) <= 2, "{width} {height}");
         assert!(height > width);
         assert_eq!(png, plate_png(&dose, &options));
         if let Ok(folder) = std::env::var("PLATE_OUT") {

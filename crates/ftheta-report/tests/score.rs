@@ -54,16 +54,11 @@ fn machine() -> Machine {
             speed_max_rad_s: 1000.0,
             f1_uncertainty: 0.03,
             kt_uncertainty: 0.005,
-            servo: Servo::StateFeedback {
-                velocity_weight_s: 7e-5,
-                lag_s: 1.6e-4,
-            },
+            servo: Servo::StateFeedback { velocity_weight_s: 7e-5, lag_s: 1.6e-4 },
             sensor: Sensor::default(),
         },
         optics: Optics {
-            lens: Lens::FTheta {
-                coefficients_mm: vec![160.0],
-            },
+            lens: Lens::FTheta { coefficients_mm: vec![160.0] },
             first_mirror: Axis::Y,
             field_mm: 120.0,
         },
@@ -104,12 +99,7 @@ fn trace(light_ns: &[(u64, u64)], beam: impl Fn(f64) -> Point) -> Trace {
         first_index: 0,
         points: points.collect(),
         light: light
-            .map(|(index, &(on_ns, off_ns))| Light {
-                index,
-                on_ns,
-                off_ns,
-                power_w: 10.0,
-            })
+            .map(|(index, &(on_ns, off_ns))| Light { index, on_ns, off_ns, power_w: 10.0 })
             .collect(),
         states: Vec::new(),
     }
@@ -124,10 +114,7 @@ fn near(value: f64, expected: f64, off: f64) {
 fn a_perfect_line_has_no_errors() {
     // Light comes on 1 ms after the start and between two points.
     let beam = |t: f64| Point::new(1000.0 * (t - 1.0007e-3), 0.0);
-    let found = score(
-        &plan(&[line(10.0)]),
-        &trace(&[(1_000_700, 11_000_700)], beam),
-    );
+    let found = score(&plan(&[line(10.0)]), &trace(&[(1_000_700, 11_000_700)], beam));
     near(found.contour_error_um.max, 0.0, 1e-6);
     near(found.coverage_error_um.max, 0.0, 0.002);
     near(found.end_error_um.max, 0.0, 0.002);
@@ -151,12 +138,7 @@ fn an_offset_is_the_contour_and_the_coverage_error() {
     near(found.coverage_error_um.p99, 7.0, 0.04);
     near(found.end_error_um.max, 0.0, 1e-6);
     assert_eq!(found.stray_energy_ratio, 0.0);
-    assert!(
-        found
-            .error_samples
-            .iter()
-            .all(|s| (s.error_um - 7.0).abs() < 1e-6)
-    );
+    assert!(found.error_samples.iter().all(|s| (s.error_um - 7.0).abs() < 1e-6));
     near(found.worst_marks[0].error_um, 7.0, 1e-9);
 }
 
@@ -223,10 +205,7 @@ fn a_circle_is_followed_all_the_way_round() {
     let radius_mm = 2.0;
     let beam = |t: f64| {
         let angle = 1000.0 * t / radius_mm;
-        Point::new(
-            1.005 * radius_mm * angle.cos(),
-            1.005 * radius_mm * angle.sin(),
-        )
+        Point::new(1.005 * radius_mm * angle.cos(), 1.005 * radius_mm * angle.sin())
     };
     // 100 µm more than once round.
     let turn_ns = (2.0 * std::f64::consts::PI * radius_mm * 1e6) as u64;
@@ -281,10 +260,7 @@ fn a_cut_corner_is_not_covered() {
 #[test]
 fn an_unlit_mark_is_missed() {
     let beam = |t: f64| Point::new(1000.0 * t, 0.0);
-    let found = score(
-        &plan(&[line(10.0), line(3.0)]),
-        &trace(&[(0, 10_000_000)], beam),
-    );
+    let found = score(&plan(&[line(10.0), line(3.0)]), &trace(&[(0, 10_000_000)], beam));
     assert_eq!(found.n_unlit_marks, 1);
     near(found.coverage_error_um.max, 3000.0, 1e-6);
 }
@@ -292,11 +268,7 @@ fn an_unlit_mark_is_missed() {
 #[test]
 fn chunks_are_as_good_as_the_whole() {
     let beam = |t: f64| Point::new(1000.0 * t, 0.004 * (700.0 * t).sin());
-    let light = [
-        (700, 3_000_100),
-        (3_500_000, 9_000_300),
-        (9_100_000, 12_000_000),
-    ];
+    let light = [(700, 3_000_100), (3_500_000, 9_000_300), (9_100_000, 12_000_000)];
     let curve = |a: f64, b: f64| BezPath::from_svg(&format!("M{a} 0 L{b} 0")).unwrap();
     let plan = plan(&[curve(0.0, 3.0), curve(3.5, 9.0), curve(9.1, 12.0)]);
     let whole = trace(&light, beam);
@@ -307,11 +279,7 @@ fn chunks_are_as_good_as_the_whole() {
             scorer.add(&chunk(&whole, i * n, points));
         }
         let found: Score = scorer.finish();
-        near(
-            found.contour_error_um.rms,
-            expected.contour_error_um.rms,
-            1e-9,
-        );
+        near(found.contour_error_um.rms, expected.contour_error_um.rms, 1e-9);
         near(found.duration_s, expected.duration_s, 1e-12);
         near(found.energy_j, expected.energy_j, 1e-12);
         assert_eq!(found.contour_error_um.max, expected.contour_error_um.max);
@@ -328,11 +296,8 @@ fn chunk(whole: &Trace, first: usize, points: &[TracePoint]) -> Trace {
     let start_ns = (first as u64).saturating_sub(1) * STEP_NS;
     let end_ns = (first + points.len() - 1) as u64 * STEP_NS;
     let light = whole.light.iter().filter_map(|light| {
-        let cut = Light {
-            on_ns: light.on_ns.max(start_ns),
-            off_ns: light.off_ns.min(end_ns),
-            ..*light
-        };
+        let cut =
+            Light { on_ns: light.on_ns.max(start_ns), off_ns: light.off_ns.min(end_ns), ..*light };
         (cut.on_ns < cut.off_ns).then_some(cut)
     });
     Trace {

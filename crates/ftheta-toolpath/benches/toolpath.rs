@@ -29,24 +29,13 @@ fn segments(n: u32) -> Job {
 }
 
 fn shape(path: BezPath, paint: Paint) -> Shape {
-    Shape {
-        source: "#s".into(),
-        path,
-        paint,
-        pen_index: 0,
-    }
+    Shape { source: "#s".into(), path, paint, pen_index: 0 }
 }
 
 fn job(shapes: Vec<Shape>, hatch: Option<Hatch>) -> Job {
     Job {
-        pens: vec![Pen {
-            hatch,
-            ..Pen::default()
-        }],
-        layers: vec![Layer {
-            name: String::new(),
-            shapes,
-        }],
+        pens: vec![Pen { hatch, ..Pen::default() }],
+        layers: vec![Layer { name: String::new(), shapes }],
         page_mm: [120.0, 120.0],
     }
 }
@@ -60,10 +49,7 @@ fn order_segments(bencher: Bencher<'_, '_>, n: u32) {
 #[divan::bench(sample_count = 3)]
 fn keep_100_000_segments(bencher: Bencher<'_, '_>) {
     let job = segments(100_000);
-    let options = LayOptions {
-        order: Order::Keep,
-        ..LayOptions::default()
-    };
+    let options = LayOptions { order: Order::Keep, ..LayOptions::default() };
     bencher.bench(|| lay(&job, &options).map(|laid| laid.value.marks.len()));
 }
 
@@ -71,18 +57,11 @@ fn keep_100_000_segments(bencher: Bencher<'_, '_>) {
 #[divan::bench(sample_count = 3)]
 fn hatch_2000_discs(bencher: Bencher<'_, '_>) {
     let shapes = (0..2000).map(|i| {
-        let centre = Point::new(
-            f64::from(i % 50) * 2.2 - 54.0,
-            f64::from(i / 50) * 2.2 - 43.0,
-        );
+        let centre = Point::new(f64::from(i % 50) * 2.2 - 54.0, f64::from(i / 50) * 2.2 - 43.0);
         let disc = Circle::new(centre, 1.0).to_path(1e-3);
         shape(disc, Paint::Fill(FillRule::NonZero))
     });
-    let hatch = Hatch {
-        spacing_mm: 0.02,
-        angle_deg: 30.0,
-        outline: true,
-    };
+    let hatch = Hatch { spacing_mm: 0.02, angle_deg: 30.0, outline: true };
     let job = job(shapes.collect(), Some(hatch));
     bencher.bench(|| lay(&job, &LayOptions::default()).map(|laid| laid.value.marks.len()));
 }

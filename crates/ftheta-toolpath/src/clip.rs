@@ -28,11 +28,8 @@ pub fn cut_curve(subpath: Subpath, half_mm: f64) -> Vec<Subpath> {
                 if !going_on {
                     parts.push(Vec::new());
                 }
-                let part = if (t0, t1) == (0.0, 1.0) {
-                    segment
-                } else {
-                    segment.subsegment(t0..t1)
-                };
+                let part =
+                    if (t0, t1) == (0.0, 1.0) { segment } else { segment.subsegment(t0..t1) };
                 if let Some(last) = parts.last_mut() {
                     last.push(part);
                 }
@@ -50,13 +47,7 @@ pub fn cut_curve(subpath: Subpath, half_mm: f64) -> Vec<Subpath> {
             last.extend(first);
         }
     }
-    parts
-        .into_iter()
-        .map(|part| Subpath {
-            curve: joined(&part),
-            closed: false,
-        })
-        .collect()
+    parts.into_iter().map(|part| Subpath { curve: joined(&part), closed: false }).collect()
 }
 
 /// One curve of segments that follow each other, up to rounding at the cuts.
@@ -87,11 +78,7 @@ pub fn cut_line(line: Line, half_mm: f64) -> Option<Line> {
         t1 = t1.min(a.max(b));
     }
     let end = |t: f64, p: Point| {
-        if t == 0.0 || t == 1.0 {
-            p
-        } else {
-            line.eval(t)
-        }
+        if t == 0.0 || t == 1.0 { p } else { line.eval(t) }
     };
     (t0 < t1).then(|| Line::new(end(t0, line.p0), end(t1, line.p1)))
 }
@@ -100,10 +87,7 @@ pub fn cut_line(line: Line, half_mm: f64) -> Option<Line> {
 pub fn first_outside(points: &[Point], half_mm: f64) -> Option<Point> {
     // A nanometre of slack: a drawing made to fit the field exactly does fit.
     let limit_mm = half_mm + 1e-6;
-    points
-        .iter()
-        .copied()
-        .find(|p| p.x.abs() > limit_mm || p.y.abs() > limit_mm)
+    points.iter().copied().find(|p| p.x.abs() > limit_mm || p.y.abs() > limit_mm)
 }
 
 fn holds(area: Rect, half_mm: f64) -> bool {
@@ -144,19 +128,11 @@ fn control_points(segment: &PathSeg) -> Vec<Point> {
 
 /// Coefficients of one coordinate by powers of the parameter.
 fn polynomial(places: &[Point], axis: usize) -> [f64; 4] {
-    let p: Vec<f64> = places
-        .iter()
-        .map(|p| if axis == 0 { p.x } else { p.y })
-        .collect();
+    let p: Vec<f64> = places.iter().map(|p| if axis == 0 { p.x } else { p.y }).collect();
     match p[..] {
         [a, b] => [a, b - a, 0.0, 0.0],
         [a, b, c] => [a, 2.0 * (b - a), a - 2.0 * b + c, 0.0],
-        [a, b, c, d] => [
-            a,
-            3.0 * (b - a),
-            3.0 * (a - 2.0 * b + c),
-            d - 3.0 * c + 3.0 * b - a,
-        ],
+        [a, b, c, d] => [a, 3.0 * (b - a), 3.0 * (a - 2.0 * b + c), d - 3.0 * c + 3.0 * b - a],
         _ => [0.0; 4],
     }
 }
@@ -171,11 +147,7 @@ fn roots(c: [f64; 4]) -> Vec<f64> {
     } else {
         vec![-c[0] / c[1]]
     };
-    solved
-        .into_iter()
-        .map(|t| polished(c, t))
-        .filter(|t| *t > 0.0 && *t < 1.0)
-        .collect()
+    solved.into_iter().map(|t| polished(c, t)).filter(|t| *t > 0.0 && *t < 1.0).collect()
 }
 
 /// Two steps of Newton, as far as they are steps.

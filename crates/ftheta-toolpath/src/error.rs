@@ -58,36 +58,21 @@ impl LayError {
     /// Where it is wrong, the value, and the limit; empty where there is none.
     pub fn fault(&self) -> (String, String, String) {
         match self {
-            Self::OutsideField {
-                place,
-                x_mm,
-                y_mm,
-                half_field_mm,
-            } => (
+            Self::OutsideField { place, x_mm, y_mm, half_field_mm } => (
                 place.clone(),
                 format!("({x_mm:.3}, {y_mm:.3}) mm"),
                 format!("±{half_field_mm} mm"),
             ),
-            Self::TooManyMarks {
-                place,
-                n_marks,
-                n_marks_max,
-            } => (place.clone(), n_marks.to_string(), n_marks_max.to_string()),
-            Self::PenMissing {
-                place,
-                pen_index,
-                n_pens,
-            } => (place.clone(), pen_index.to_string(), n_pens.to_string()),
+            Self::TooManyMarks { place, n_marks, n_marks_max } => {
+                (place.clone(), n_marks.to_string(), n_marks_max.to_string())
+            }
+            Self::PenMissing { place, pen_index, n_pens } => {
+                (place.clone(), pen_index.to_string(), n_pens.to_string())
+            }
             Self::NotFinite { place } => (place.clone(), "not finite".into(), String::new()),
-            Self::TooSmall {
-                place,
-                value_mm,
-                limit_mm,
-            } => (
-                place.clone(),
-                format!("{value_mm} mm"),
-                format!("{limit_mm} mm"),
-            ),
+            Self::TooSmall { place, value_mm, limit_mm } => {
+                (place.clone(), format!("{value_mm} mm"), format!("{limit_mm} mm"))
+            }
         }
     }
 }

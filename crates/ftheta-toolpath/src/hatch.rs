@@ -115,13 +115,7 @@ fn edges_of(contours: &[Vec<Point>], turn: Affine, spacing_mm: f64, reach: i64) 
             let lines = (line_at(low.y), line_at(high.y));
             if lines.0 < lines.1 {
                 let slope = (high.x - low.x) / (high.y - low.y);
-                edges.push(Edge {
-                    lines,
-                    at_mm: low.x - slope * low.y,
-                    slope,
-                    winding,
-                    x_mm: 0.0,
-                });
+                edges.push(Edge { lines, at_mm: low.x - slope * low.y, slope, winding, x_mm: 0.0 });
             }
         }
     }
@@ -141,11 +135,7 @@ fn pieces_of(active: &[Edge], rule: FillRule, shortest_mm: f64) -> Vec<Piece> {
         match (was_inside, is_inside(winding)) {
             (false, true) => match pieces.last_mut() {
                 Some(last) if edge.x_mm - last.hi_mm < GAP_MM => {}
-                _ => pieces.push(Piece {
-                    lo_mm: edge.x_mm,
-                    hi_mm: edge.x_mm,
-                    run_index: 0,
-                }),
+                _ => pieces.push(Piece { lo_mm: edge.x_mm, hi_mm: edge.x_mm, run_index: 0 }),
             },
             (true, false) => {
                 if let Some(last) = pieces.last_mut() {

@@ -148,11 +148,7 @@ impl<'a> Route<'a> {
         let from = self.nodes[node as usize].0[side];
         let to = self.nodes[other_node].0[other_side];
         let at_entry = (other_side == 1) == self.turned[other_node];
-        Some((
-            self.place_of[other_node] as usize,
-            at_entry,
-            from.distance(to),
-        ))
+        Some((self.place_of[other_node] as usize, at_entry, from.distance(to)))
     }
 
     /// Tries what puts the entry of place p next to an end of place q.
@@ -162,23 +158,13 @@ impl<'a> Route<'a> {
             return true;
         }
         (1..=MOVE_MAX).any(|n| {
-            let here = |before, reverse| Move {
-                first: p,
-                n,
-                before,
-                reverse,
-            };
+            let here = |before, reverse| Move { first: p, n, before, reverse };
             (entry || is_point) && self.try_move(here(q, true), out)
                 || (!entry || is_point)
                     && (self.try_move(here(q + 1, false), out)
                         || q + 1 >= n
                             && self.try_move(
-                                Move {
-                                    first: q + 1 - n,
-                                    n,
-                                    before: p,
-                                    reverse: false,
-                                },
+                                Move { first: q + 1 - n, n, before: p, reverse: false },
                                 out,
                             ))
         })
@@ -191,25 +177,13 @@ impl<'a> Route<'a> {
             return true;
         }
         (1..=MOVE_MAX).any(|n| {
-            let here = |before, reverse| Move {
-                first: (p + 1).wrapping_sub(n),
-                n,
-                before,
-                reverse,
-            };
+            let here =
+                |before, reverse| Move { first: (p + 1).wrapping_sub(n), n, before, reverse };
             p + 1 >= n
                 && ((!entry || is_point) && self.try_move(here(q + 1, true), out)
                     || (entry || is_point) && self.try_move(here(q, false), out))
                 || (entry || is_point)
-                    && self.try_move(
-                        Move {
-                            first: q,
-                            n,
-                            before: p + 1,
-                            reverse: false,
-                        },
-                        out,
-                    )
+                    && self.try_move(Move { first: q, n, before: p + 1, reverse: false }, out)
         })
     }
 
@@ -242,11 +216,7 @@ impl<'a> Route<'a> {
             return false;
         }
         let (entry, exit) = (self.entry(i), self.exit(end - 1));
-        let (new_entry, new_exit) = if m.reverse {
-            (exit, entry)
-        } else {
-            (entry, exit)
-        };
+        let (new_entry, new_exit) = if m.reverse { (exit, entry) } else { (entry, exit) };
         let left = self.exit(i.wrapping_sub(1));
         let target = self.exit(m.before.wrapping_sub(1));
         let mut gain_mm = left.distance(entry) - target.distance(new_entry);
@@ -287,10 +257,9 @@ impl<'a> Route<'a> {
     /// Whether some node and its parent both lie in the places i to j.
     fn has_nested_pair(&self, i: usize, j: usize) -> bool {
         self.nested
-            && self.tour[i..=j].iter().any(|&node| {
-                self.parent_places(node)
-                    .any(|place| (i..=j).contains(&place))
-            })
+            && self.tour[i..=j]
+                .iter()
+                .any(|&node| self.parent_places(node).any(|place| (i..=j).contains(&place)))
     }
 
     fn breaks_nesting(&self, m: Move) -> bool {
@@ -299,8 +268,7 @@ impl<'a> Route<'a> {
         }
         let end = m.first + m.n;
         let lies_in = |node: u32, lo: usize, hi: usize| {
-            self.parent_places(node)
-                .any(|place| (lo..hi).contains(&place))
+            self.parent_places(node).any(|place| (lo..hi).contains(&place))
         };
         let mut moved = self.tour[m.first..end].iter();
         if m.reverse && moved.clone().any(|&node| lies_in(node, m.first, end)) {
@@ -373,14 +341,10 @@ fn neighbours(nodes: &[Node]) -> Vec<u32> {
     let tree = NearestTree::new(&places, true);
     let mut near = vec![u32::MAX; 2 * nodes.len() * N_NEIGHBOURS];
     for &(place, end) in &ends {
-        let found = tree.nearest_few(place, N_NEIGHBOURS, |other| {
-            ends[other as usize].1 / 2 != end / 2
-        });
-        let n_sides = if nodes[end as usize / 2].0[0] == nodes[end as usize / 2].0[1] {
-            2
-        } else {
-            1
-        };
+        let found =
+            tree.nearest_few(place, N_NEIGHBOURS, |other| ends[other as usize].1 / 2 != end / 2);
+        let n_sides =
+            if nodes[end as usize / 2].0[0] == nodes[end as usize / 2].0[1] { 2 } else { 1 };
         for side in 0..n_sides {
             let list = &mut near[(end as usize + side) * N_NEIGHBOURS..][..N_NEIGHBOURS];
             for (slot, &(_, other)) in list.iter_mut().zip(&found) {

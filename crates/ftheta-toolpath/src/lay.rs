@@ -70,11 +70,7 @@ impl Default for LayOptions {
 /// The short way is an improved greedy one, typically 5 % longer than the shortest there is. It is
 /// never longer than the drawing's own order, unless that marks an outer contour first.
 pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayError> {
-    at_least(
-        "flatten_tolerance_mm",
-        options.flatten_tolerance_mm,
-        TOLERANCE_MIN_MM,
-    )?;
+    at_least("flatten_tolerance_mm", options.flatten_tolerance_mm, TOLERANCE_MIN_MM)?;
     let mut layout = Layout {
         options,
         units: vec![Vec::new(); job.pens.len()],
@@ -89,9 +85,7 @@ pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayErr
             n_pens: job.pens.len(),
         })?;
         if !shape.path.is_finite() {
-            return Err(LayError::NotFinite {
-                place: shape.source.clone(),
-            });
+            return Err(LayError::NotFinite { place: shape.source.clone() });
         }
         match (shape.paint, &pen.hatch) {
             (Paint::Stroke, _) => layout.add_outline(shape, pen)?,
@@ -102,14 +96,9 @@ pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayErr
             }
         }
     }
-    let Layout {
-        units, warnings, ..
-    } = layout;
+    let Layout { units, warnings, .. } = layout;
     Ok(Imported {
-        value: Toolpath {
-            pens: job.pens.clone(),
-            marks: in_order(units, options),
-        },
+        value: Toolpath { pens: job.pens.clone(), marks: in_order(units, options) },
         warnings,
     })
 }
@@ -295,11 +284,7 @@ fn at_least(place: &str, value_mm: f64, limit_mm: f64) -> Result<(), LayError> {
     if value_mm >= limit_mm && value_mm.is_finite() {
         return Ok(());
     }
-    Err(LayError::TooSmall {
-        place: place.into(),
-        value_mm,
-        limit_mm,
-    })
+    Err(LayError::TooSmall { place: place.into(), value_mm, limit_mm })
 }
 
 fn in_order(units: Vec<Vec<Unit>>, options: &LayOptions) -> Vec<Mark> {
@@ -337,12 +322,8 @@ fn short_stops(units: &[Vec<Unit>], mut moves_left: u64) -> Vec<Vec<Stop>> {
     }
     let kept: Vec<Vec<Stop>> = units.iter().map(|units| order::kept(units)).collect();
     // The greedy start can lose against a drawing that is well ordered already.
-    let allowed = || {
-        units
-            .iter()
-            .zip(&kept)
-            .all(|(units, stops)| order::respects_nesting(units, stops))
-    };
+    let allowed =
+        || units.iter().zip(&kept).all(|(units, stops)| order::respects_nesting(units, stops));
     if jump_length_mm(units, &kept) < jump_length_mm(units, &found) && allowed() {
         return kept;
     }

@@ -37,19 +37,13 @@ impl NearestTree {
             let Some(&(first, _)) = slice.first() else {
                 continue;
             };
-            let area = slice
-                .iter()
-                .fold(Rect::from_points(first, first), |r, p| r.union_pt(p.0));
+            let area = slice.iter().fold(Rect::from_points(first, first), |r, p| r.union_pt(p.0));
             let n_active = if active { slice.len() as u32 } else { 0 };
             nodes[range.node] = (area, n_active);
             if slice.len() > LEAF {
                 let middle = slice.len() / 2;
                 let key = |p: &(Point, u32)| {
-                    if area.width() > area.height() {
-                        p.0.x
-                    } else {
-                        p.0.y
-                    }
+                    if area.width() > area.height() { p.0.x } else { p.0.y }
                 };
                 slice.select_nth_unstable_by(middle, |a, b| {
                     key(a).total_cmp(&key(b)).then(a.1.cmp(&b.1))
@@ -61,12 +55,7 @@ impl NearestTree {
         for (slot, place) in places.iter().enumerate() {
             slot_of[place.1 as usize] = slot as u32;
         }
-        Self {
-            places,
-            active: vec![active; n],
-            slot_of,
-            nodes,
-        }
+        Self { places, active: vec![active; n], slot_of, nodes }
     }
 
     /// Takes a place out, or puts it back.
@@ -114,11 +103,7 @@ impl NearestTree {
                 best.insert(at, place);
                 best.truncate(n);
             }
-            if best.len() < n {
-                f64::INFINITY
-            } else {
-                best[n - 1].0
-            }
+            if best.len() < n { f64::INFINITY } else { best[n - 1].0 }
         });
         best
     }
@@ -141,9 +126,8 @@ impl NearestTree {
                 }
                 continue;
             }
-            let [left, right] = range
-                .halves()
-                .map(|half| (distance_sq_to(self.nodes[half.node].0, from), half));
+            let [left, right] =
+                range.halves().map(|half| (distance_sq_to(self.nodes[half.node].0, from), half));
             // The nearer half is pushed last, so that it is searched first.
             if left.0 <= right.0 {
                 stack.extend([right, left]);
@@ -156,20 +140,13 @@ impl NearestTree {
 
 impl Range {
     fn all(n: usize) -> Self {
-        Self {
-            node: 0,
-            lo: 0,
-            hi: n,
-        }
+        Self { node: 0, lo: 0, hi: n }
     }
 
     fn halves(self) -> [Self; 2] {
         let middle = self.lo + (self.hi - self.lo) / 2;
         let half = |node, lo, hi| Self { node, lo, hi };
-        [
-            half(2 * self.node + 1, self.lo, middle),
-            half(2 * self.node + 2, middle, self.hi),
-        ]
+        [half(2 * self.node + 1, self.lo, middle), half(2 * self.node + 2, middle, self.hi)]
     }
 }
 

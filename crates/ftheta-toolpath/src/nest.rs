@@ -71,18 +71,11 @@ impl Slabs {
     fn new(points: &[Point]) -> Self {
         let area = bounds(points);
         let total = area.height().max(f64::MIN_POSITIVE);
-        let heights: f64 = points
-            .windows(2)
-            .map(|e| (e[1].y - e[0].y).abs() / total)
-            .sum();
+        let heights: f64 = points.windows(2).map(|e| (e[1].y - e[0].y).abs() / total).sum();
         // As many bands as keep the lists below four entries per edge.
         let n_edges = points.len() as f64;
         let n = (3.0 * n_edges / heights.max(1e-9)).clamp(1.0, n_edges) as usize;
-        let mut slabs = Self {
-            y0: area.y0,
-            height: total / n as f64,
-            bands: vec![Vec::new(); n],
-        };
+        let mut slabs = Self { y0: area.y0, height: total / n as f64, bands: vec![Vec::new(); n] };
         for (i, edge) in points.windows(2).enumerate() {
             let lo = slabs.band(edge[0].y.min(edge[1].y));
             let hi = slabs.band(edge[0].y.max(edge[1].y));
@@ -109,11 +102,7 @@ impl Slabs {
 }
 
 fn bounds(points: &[Point]) -> Rect {
-    points
-        .iter()
-        .fold(Rect::from_points(points[0], points[0]), |r, &p| {
-            r.union_pt(p)
-        })
+    points.iter().fold(Rect::from_points(points[0], points[0]), |r, &p| r.union_pt(p))
 }
 
 fn holds(outer: Rect, inner: Rect) -> bool {
@@ -121,9 +110,6 @@ fn holds(outer: Rect, inner: Rect) -> bool {
 }
 
 fn area_mm2(points: &[Point]) -> f64 {
-    let twice: f64 = points
-        .windows(2)
-        .map(|e| (e[0] - points[0]).cross(e[1] - points[0]))
-        .sum();
+    let twice: f64 = points.windows(2).map(|e| (e[0] - points[0]).cross(e[1] - points[0])).sum();
     0.5 * twice.abs()
 }

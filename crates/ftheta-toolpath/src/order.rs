@@ -26,12 +26,7 @@ pub fn shortest(units: &[Unit], start: Point, moves_left: &mut u64) -> Vec<Stop>
     let poses = Poses::new(units);
     let parents = unit_parents(units);
     let stops = greedy(&poses, &parents, start);
-    let mut plan = Plan {
-        units,
-        poses,
-        start,
-        stops,
-    };
+    let mut plan = Plan { units, poses, start, stops };
     for _ in 0..2 {
         plan.improve(&parents, moves_left);
         plan.settle();
@@ -41,12 +36,7 @@ pub fn shortest(units: &[Unit], start: Point, moves_left: &mut u64) -> Vec<Stop>
 
 /// The units as they come, as drawn.
 pub fn kept(units: &[Unit]) -> Vec<Stop> {
-    (0..units.len())
-        .map(|unit_index| Stop {
-            unit_index,
-            pose_index: 0,
-        })
-        .collect()
+    (0..units.len()).map(|unit_index| Stop { unit_index, pose_index: 0 }).collect()
 }
 
 /// Whether every contour comes before the one it lies in.
@@ -131,10 +121,7 @@ impl Plan<'_> {
                     true => self.units[unit_index].turned(pose_of[unit_index]),
                     false => pose_of[unit_index],
                 };
-                Stop {
-                    unit_index,
-                    pose_index,
-                }
+                Stop { unit_index, pose_index }
             })
             .collect();
     }
@@ -143,10 +130,7 @@ impl Plan<'_> {
     fn settle(&mut self) {
         let mut from = self.start;
         for at in 0..self.stops.len() {
-            let next = self
-                .stops
-                .get(at + 1)
-                .map(|&stop| self.poses.at(stop).entry);
+            let next = self.stops.get(at + 1).map(|&stop| self.poses.at(stop).entry);
             let stop = &mut self.stops[at];
             let cost = |pose: &Pose| {
                 let onward = next.map_or(0.0, |next| pose.exit.distance(next));
@@ -170,10 +154,7 @@ impl Plan<'_> {
 /// The closed units that each closed unit lies in.
 fn unit_parents(units: &[Unit]) -> Vec<Vec<u32>> {
     let closed: Vec<usize> = (0..units.len()).filter(|&i| units[i].is_closed()).collect();
-    let contours: Vec<_> = closed
-        .iter()
-        .map(|&i| &units[i].marks[0].points[..])
-        .collect();
+    let contours: Vec<_> = closed.iter().map(|&i| &units[i].marks[0].points[..]).collect();
     let mut parents = vec![Vec::new(); units.len()];
     for (&unit, outer) in closed.iter().zip(nest::parents(&contours)) {
         parents[unit] = outer.iter().map(|&o| closed[o as usize] as u32).collect();
@@ -192,10 +173,8 @@ fn greedy(poses: &Poses, parents: &[Vec<u32>], start: Point) -> Vec<Stop> {
     for unit_index in 0..n {
         let n_poses = poses.of(unit_index).len();
         let step = n_poses.div_ceil(ENTRIES_MAX);
-        entries.extend((0..n_poses).step_by(step).map(|pose_index| Stop {
-            unit_index,
-            pose_index,
-        }));
+        entries
+            .extend((0..n_poses).step_by(step).map(|pose_index| Stop { unit_index, pose_index }));
         first.push(entries.len());
     }
     let places: Vec<Point> = entries.iter().map(|&stop| poses.at(stop).entry).collect();

@@ -97,12 +97,7 @@ struct Builder {
 
 impl Builder {
     fn at(start: Point) -> Self {
-        Self {
-            els: vec![PathEl::MoveTo(start)],
-            start,
-            at: start,
-            drawn: false,
-        }
+        Self { els: vec![PathEl::MoveTo(start)], start, at: start, drawn: false }
     }
 
     fn push(&mut self, el: PathEl, places: &[Point]) {
@@ -119,11 +114,8 @@ impl Builder {
 
     /// Adds the curve to `found`; returns 1 if there was one without length.
     fn finish(self, close: bool, found: &mut Vec<Subpath>) -> usize {
-        let has_length = self
-            .els
-            .iter()
-            .flat_map(places)
-            .any(|p| p.distance(self.start) >= SAME_PLACE_MM);
+        let has_length =
+            self.els.iter().flat_map(places).any(|p| p.distance(self.start) >= SAME_PLACE_MM);
         if !has_length {
             return usize::from(self.drawn);
         }
@@ -136,10 +128,7 @@ impl Builder {
         } else if closed {
             els.push(PathEl::LineTo(self.start));
         }
-        found.push(Subpath {
-            curve: BezPath::from_vec(els),
-            closed,
-        });
+        found.push(Subpath { curve: BezPath::from_vec(els), closed });
         0
     }
 }

@@ -46,22 +46,15 @@ impl Unit {
     pub fn pose(&self, pose_index: usize) -> Pose {
         if self.is_closed() {
             let entry = self.vertex(pose_index);
-            return Pose {
-                entry,
-                exit: entry,
-                inside_mm: 0.0,
-            };
+            return Pose { entry, exit: entry, inside_mm: 0.0 };
         }
         let flipped = pose_index & 2 != 0;
         let ends = |mark: &Mark| match flipped {
             false => (mark.start(), mark.end()),
             true => (mark.end(), mark.start()),
         };
-        let inside_mm = self
-            .marks
-            .windows(2)
-            .map(|pair| ends(&pair[0]).1.distance(ends(&pair[1]).0))
-            .sum();
+        let inside_mm =
+            self.marks.windows(2).map(|pair| ends(&pair[0]).1.distance(ends(&pair[1]).0)).sum();
         let mut entry = ends(&self.marks[0]).0;
         let mut exit = ends(&self.marks[self.marks.len() - 1]).1;
         if pose_index & 1 != 0 {
@@ -70,20 +63,12 @@ impl Unit {
         if self.returns() {
             exit = entry;
         }
-        Pose {
-            entry,
-            exit,
-            inside_mm,
-        }
+        Pose { entry, exit, inside_mm }
     }
 
     /// The pose that goes through a pose's places the other way.
     pub fn turned(&self, pose_index: usize) -> usize {
-        if self.is_closed() || self.returns() {
-            pose_index
-        } else {
-            pose_index ^ 1
-        }
+        if self.is_closed() || self.returns() { pose_index } else { pose_index ^ 1 }
     }
 
     /// Its marks in a pose. With `alternate` every second pass of open marks goes backwards.
@@ -119,9 +104,7 @@ impl Unit {
     }
 
     fn vertex(&self, index: usize) -> Point {
-        self.marks[0].curve.elements()[index]
-            .end_point()
-            .unwrap_or_default()
+        self.marks[0].curve.elements()[index].end_point().unwrap_or_default()
     }
 }
 

@@ -25,23 +25,10 @@ fn check(shapes: &[&str], hatch: Option<Hatch>, options: &LayOptions, expected: 
             pen_index,
         }
     });
-    let second = Pen {
-        name: "second".into(),
-        n_passes: 2,
-        ..Pen::default()
-    };
+    let second = Pen { name: "second".into(), n_passes: 2, ..Pen::default() };
     let job = Job {
-        layers: vec![Layer {
-            name: String::new(),
-            shapes: shapes.collect(),
-        }],
-        pens: vec![
-            Pen {
-                hatch,
-                ..Pen::default()
-            },
-            second,
-        ],
+        layers: vec![Layer { name: String::new(), shapes: shapes.collect() }],
+        pens: vec![Pen { hatch, ..Pen::default() }, second],
         page_mm: [20.0, 20.0],
     };
     let text = match lay(&job, options) {
@@ -62,11 +49,7 @@ fn check(shapes: &[&str], hatch: Option<Hatch>, options: &LayOptions, expected: 
     expected.assert_eq(&text);
 }
 
-const HATCH: Hatch = Hatch {
-    spacing_mm: 1.0,
-    angle_deg: 0.0,
-    outline: false,
-};
+const HATCH: Hatch = Hatch { spacing_mm: 1.0, angle_deg: 0.0, outline: false };
 
 #[test]
 fn shortest_turns_marks_and_contours() {
@@ -92,10 +75,7 @@ fn shortest_turns_marks_and_contours() {
 
 #[test]
 fn keep_leaves_the_drawing_alone() {
-    let options = LayOptions {
-        order: Order::Keep,
-        ..LayOptions::default()
-    };
+    let options = LayOptions { order: Order::Keep, ..LayOptions::default() };
     check(
         &["1 stroke M9 0 L5 0", "0 stroke M-1 0 L-4 0 M0 0 H1"],
         None,
@@ -147,12 +127,8 @@ fn inner_contours_come_first() {
 
 #[test]
 fn clip_cuts_curves_and_lines() {
-    let options = LayOptions {
-        half_field_mm: 2.0,
-        clip: true,
-        order: Order::Keep,
-        ..LayOptions::default()
-    };
+    let options =
+        LayOptions { half_field_mm: 2.0, clip: true, order: Order::Keep, ..LayOptions::default() };
     check(
         &[
             "0 stroke M0 0 Q2 0 4 2 L9 9",
@@ -177,11 +153,7 @@ fn clip_cuts_curves_and_lines() {
 #[test]
 fn faults_and_warnings_name_the_place() {
     check(
-        &[
-            "0 stroke M0 0 L0 0",
-            "0 fill M0 0 H1 V1 Z",
-            "0 fill M2 0 H3 V1 Z",
-        ],
+        &["0 stroke M0 0 L0 0", "0 fill M0 0 H1 V1 Z", "0 fill M2 0 H3 V1 Z"],
         None,
         &LayOptions::default(),
         &expect![[r#"
@@ -201,10 +173,7 @@ fn faults_and_warnings_name_the_place() {
         ("#0", "(70.000, 0.000) mm", "±60 mm")
     "##]],
     );
-    let thin = Hatch {
-        spacing_mm: 0.0,
-        ..HATCH
-    };
+    let thin = Hatch { spacing_mm: 0.0, ..HATCH };
     check(
         &["0 fill M0 0 H1 V1 Z"],
         Some(thin),

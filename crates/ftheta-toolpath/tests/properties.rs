@@ -50,11 +50,7 @@ fn drawing() -> impl Strategy<Value = Job> {
     let pens = (1u32..4, 0.0..180.0, any::<bool>()).prop_map(|(n_passes, angle_deg, outline)| {
         let hatched = Pen {
             n_passes,
-            hatch: Some(Hatch {
-                spacing_mm: 1.5,
-                angle_deg,
-                outline,
-            }),
+            hatch: Some(Hatch { spacing_mm: 1.5, angle_deg, outline }),
             ..Pen::default()
         };
         vec![Pen::default(), hatched]
@@ -72,10 +68,7 @@ fn drawing() -> impl Strategy<Value = Job> {
             pen_index,
         });
         Job {
-            layers: vec![Layer {
-                name: String::new(),
-                shapes: shapes.collect(),
-            }],
+            layers: vec![Layer { name: String::new(), shapes: shapes.collect() }],
             pens,
             page_mm: [120.0, 120.0],
         }
@@ -115,16 +108,11 @@ fn is_inside(p: Point, polygon: &[Point]) -> bool {
 
 fn distance_to_polyline(p: Point, points: &[Point]) -> f64 {
     let lines = points.windows(2).map(|e| kurbo::Line::new(e[0], e[1]));
-    lines
-        .map(|line| line.nearest(p, 1e-9).distance_sq.sqrt())
-        .fold(f64::INFINITY, f64::min)
+    lines.map(|line| line.nearest(p, 1e-9).distance_sq.sqrt()).fold(f64::INFINITY, f64::min)
 }
 
 fn config() -> ProptestConfig {
-    ProptestConfig {
-        failure_persistence: None,
-        ..ProptestConfig::with_cases(200)
-    }
+    ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(200) }
 }
 
 proptest! {

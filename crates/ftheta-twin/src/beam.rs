@@ -99,11 +99,7 @@ impl Beam {
     #[inline]
     fn place(&self) -> FieldPoint {
         let [x_rad, y_rad] = self.angles;
-        match self
-            .table
-            .as_ref()
-            .and_then(|table| table.value(x_rad, y_rad))
-        {
+        match self.table.as_ref().and_then(|table| table.value(x_rad, y_rad)) {
             Some([x_mm, y_mm]) => FieldPoint::new(x_mm, y_mm),
             None => field_from_angles(&self.machine.optics, MirrorAngles::new(x_rad, y_rad)),
         }
@@ -122,12 +118,8 @@ impl Beam {
     }
 
     fn sensor_error(&mut self, axis: usize) -> f64 {
-        let Sensor {
-            gain_error,
-            nonlinearity,
-            drift_rad_s,
-            noise_rad,
-        } = self.machine.scanner.sensor;
+        let Sensor { gain_error, nonlinearity, drift_rad_s, noise_rad } =
+            self.machine.scanner.sensor;
         let mut error_rad = 0.0;
         if gain_error != 0.0 || nonlinearity != 0.0 {
             let angle_rad = self.axes[axis].rotor_rad();
@@ -148,9 +140,7 @@ impl Beam {
 /// Fewest sub-steps of a whole number of nanoseconds that are short enough.
 fn substeps(period_ns: u32) -> u32 {
     let fewest = period_ns.div_ceil(STEP_MAX_NS);
-    (fewest..=period_ns)
-        .find(|&n| period_ns.is_multiple_of(n))
-        .unwrap_or(period_ns)
+    (fewest..=period_ns).find(|&n| period_ns.is_multiple_of(n)).unwrap_or(period_ns)
 }
 
 #[cfg(test)]

@@ -48,16 +48,12 @@ impl Exposure {
     pub fn blurred(mut self, spot_diameter_mm: f64) -> DoseMap {
         let (key, tile) = std::mem::replace(&mut self.current, ((0, 0), new_tile()));
         self.tiles.insert(key, tile);
-        self.tiles
-            .retain(|_, tile| tile.iter().any(|&energy| energy > 0.0));
+        self.tiles.retain(|_, tile| tile.iter().any(|&energy| energy > 0.0));
         // 1/e² radius of the intensity is two standard deviations.
         let kernel = kernel(0.25 * spot_diameter_mm * self.pixels_per_mm);
         let along_x = convolve(&self.tiles, &kernel, true);
         let tiles = convolve(&along_x, &kernel, false);
-        DoseMap {
-            pixel_mm: self.pixel_mm,
-            tiles,
-        }
+        DoseMap { pixel_mm: self.pixel_mm, tiles }
     }
 }
 
@@ -68,9 +64,8 @@ fn new_tile() -> Tile {
 /// Half of a symmetric Gaussian, centre first, of sum one; reaches five standard deviations.
 fn kernel(sigma_pixels: f64) -> Vec<f32> {
     let reach = (5.0 * sigma_pixels).ceil().min((TILE_PIXELS - 1) as f64) as usize;
-    let weights: Vec<f64> = (0..=reach)
-        .map(|i| (-0.5 * (i as f64 / sigma_pixels).powi(2)).exp())
-        .collect();
+    let weights: Vec<f64> =
+        (0..=reach).map(|i| (-0.5 * (i as f64 / sigma_pixels).powi(2)).exp()).collect();
     let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
     weights.iter().map(|weight| (weight / sum) as f32).collect()
 }
@@ -104,11 +99,7 @@ fn convolve(
             }
         }
         for part in -1..=1_i32 {
-            let key = if rows {
-                (row, column + part)
-            } else {
-                (row + part, column)
-            };
+            let key = if rows { (row, column + part) } else { (row + part, column) };
             spill(&wide, part, reach, stride, key, &mut result);
         }
     }
@@ -145,8 +136,7 @@ fn spill(
     }
     if !add.is_empty() {
         let tile = result.entry(key).or_insert_with(new_tile);
-        add.into_iter()
-            .for_each(|(index, energy)| tile[index] += energy);
+        add.into_iter().for_each(|(index, energy)| tile[index] += energy);
     }
 }
 

@@ -34,25 +34,16 @@ impl LaserState {
     /// Takes a signal edge. An off edge whose light would end before it began leaves an interval
     /// of no length, as a source with a slow start does.
     pub fn take(&mut self, edge: LaserEdge) {
-        let latency_ns = if edge.power_w > 0.0 {
-            self.on_latency_ns
-        } else {
-            self.off_latency_ns
-        };
+        let latency_ns = if edge.power_w > 0.0 { self.on_latency_ns } else { self.off_latency_ns };
         let time_ns = edge.time_ns.saturating_add_signed(latency_ns);
-        let time_ns = self
-            .changes
-            .back()
-            .map_or(time_ns, |last| time_ns.max(last.time_ns));
+        let time_ns = self.changes.back().map_or(time_ns, |last| time_ns.max(last.time_ns));
         self.changes.push_back(LaserEdge { time_ns, ..edge });
     }
 
     /// Time of the next change, ns.
     #[inline]
     pub fn next_ns(&self) -> u64 {
-        self.changes
-            .front()
-            .map_or(u64::MAX, |change| change.time_ns)
+        self.changes.front().map_or(u64::MAX, |change| change.time_ns)
     }
 
     /// Power of the light until the next change, W.
@@ -80,11 +71,6 @@ impl LaserState {
             return None;
         }
         let on_ns = std::mem::replace(&mut self.on_ns, now_ns);
-        Some(Light {
-            index: self.n_begun - 1,
-            on_ns,
-            off_ns: now_ns,
-            power_w: self.power_w,
-        })
+        Some(Light { index: self.n_begun - 1, on_ns, off_ns: now_ns, power_w: self.power_w })
     }
 }

@@ -61,18 +61,12 @@ impl Twin {
     pub fn new(machine: &Machine, options: &TwinOptions) -> Result<Self, ServoError> {
         let beam = Beam::new(machine, &options.mismatch, options.seed)?;
         let period_ns = u64::from(machine.output.period_ns);
-        let trace = Trace {
-            step_ns: period_ns / beam.n_substeps() as u64,
-            ..Trace::default()
-        };
+        let trace = Trace { step_ns: period_ns / beam.n_substeps() as u64, ..Trace::default() };
         Ok(Self {
             beam,
             laser: LaserState::new(machine.laser.on_latency_ns, machine.laser.off_latency_ns),
             exposure: Exposure::new(options.pixel_mm),
-            trace: Trace {
-                points: vec![TracePoint::default()],
-                ..trace
-            },
+            trace: Trace { points: vec![TracePoint::default()], ..trace },
             last: FieldPoint::default(),
             state_stride: options.state_stride.max(1),
             spot_diameter_mm: machine.laser.spot_diameter_mm,
@@ -116,8 +110,7 @@ impl Twin {
                     from.x_mm + share * (to.x_mm - from.x_mm),
                     from.y_mm + share * (to.y_mm - from.y_mm),
                 );
-                self.exposure
-                    .add(place, power_w * (until_ns - now_ns) as f64 * 1e-9);
+                self.exposure.add(place, power_w * (until_ns - now_ns) as f64 * 1e-9);
             }
             if until_ns == end_ns {
                 return;
@@ -133,10 +126,7 @@ impl SampleSink for Twin {
 
     fn push(&mut self, block: &Block) -> Result<(), TwinError> {
         if block.first_index != self.next_index {
-            return Err(TwinError::Gap {
-                found: block.first_index,
-                expected: self.next_index,
-            });
+            return Err(TwinError::Gap { found: block.first_index, expected: self.next_index });
         }
         block.edges.iter().for_each(|&edge| self.laser.take(edge));
         let mut places = [FieldPoint::default(); 100];

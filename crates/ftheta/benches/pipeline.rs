@@ -30,9 +30,7 @@ fn main() {
 fn panel() -> Plan {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gallery/panel.svg");
     let (recipe, _) = import::recipe_for(&path, None).unwrap();
-    let job = import::drawing(&path, &recipe, &SvgOptions::default())
-        .unwrap()
-        .value;
+    let job = import::drawing(&path, &recipe, &SvgOptions::default()).unwrap().value;
     let machine = preset("S10").unwrap().unwrap();
     let toolpath = lay(&job, &LayOptions::default()).unwrap().value;
     let settings = Settings::new(&machine, &recipe.classic).unwrap();
@@ -54,14 +52,12 @@ fn render(bencher: Bencher) {
     let plan = panel();
     let renderer = Renderer::new(&plan);
     let mut block = Block::default();
-    bencher
-        .counter(ItemsCount::new(plan.n_samples()))
-        .bench_local(|| {
-            let mut renderer = renderer.clone();
-            while renderer.next_block(&mut block) {
-                black_box(&block);
-            }
-        });
+    bencher.counter(ItemsCount::new(plan.n_samples())).bench_local(|| {
+        let mut renderer = renderer.clone();
+        while renderer.next_block(&mut block) {
+            black_box(&block);
+        }
+    });
 }
 
 #[divan::bench]
@@ -70,10 +66,7 @@ fn write_only(bencher: Bencher) {
     let mut words = vec![DacCodes::default(); 4096];
     bencher.counter(ItemsCount::new(n_samples)).bench_local(|| {
         for index in 0..n_samples as usize {
-            words[index & 4095] = black_box(DacCodes {
-                x: index as i32,
-                y: -(index as i32),
-            });
+            words[index & 4095] = black_box(DacCodes { x: index as i32, y: -(index as i32) });
         }
     });
 }
@@ -100,12 +93,8 @@ fn audit(bencher: Bencher) {
 }
 
 fn twin(plan: &Plan) -> Twin {
-    let options = TwinOptions {
-        mismatch: Mismatch::default(),
-        seed: 1,
-        pixel_mm: 0.016,
-        state_stride: 6,
-    };
+    let options =
+        TwinOptions { mismatch: Mismatch::default(), seed: 1, pixel_mm: 0.016, state_stride: 6 };
     Twin::new(&plan.machine, &options).unwrap()
 }
 
@@ -136,11 +125,9 @@ fn score(bencher: Bencher) {
             twin.take_trace()
         })
         .collect();
-    bencher
-        .counter(ItemsCount::new(plan.n_samples()))
-        .bench_local(|| {
-            let mut scorer = Scorer::new(&plan);
-            traces.iter().for_each(|trace| scorer.add(trace));
-            scorer.finish()
-        });
+    bencher.counter(ItemsCount::new(plan.n_samples())).bench_local(|| {
+        let mut scorer = Scorer::new(&plan);
+        traces.iter().for_each(|trace| scorer.add(trace));
+        scorer.finish()
+    });
 }

@@ -15,21 +15,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let recipe = Recipe::default();
     let machine = machine::preset("S10").ok_or("no such preset")??;
     let job = svg::read(DRAWING.as_bytes(), &recipe, &svg::SvgOptions::default())?;
-    let marked = mark(
-        &job.value,
-        &machine,
-        &recipe,
-        &MarkOptions::default(),
-        &mut |_| {},
-    )?;
-    println!(
-        "plan {}: {:.1} ms",
-        marked.plan.id(),
-        marked.times.duration_s * 1e3
-    );
-    println!(
-        "contour error {:.2} µm max",
-        marked.score.contour_error_um.max
-    );
+    let marked = mark(&job.value, &machine, &recipe, &MarkOptions::default(), &mut |_| {})?;
+    println!("plan {}: {:.1} ms", marked.plan.id(), marked.times.duration_s * 1e3);
+    println!("contour error {:.2} µm max", marked.score.contour_error_um.max);
     Ok(())
 }

@@ -118,25 +118,15 @@ impl Error {
     /// The error in parts.
     pub fn fault(&self) -> Fault {
         let (place, value, limit) = match self {
-            Self::Io { path, source, .. } => (
-                path.display().to_string(),
-                source.to_string(),
-                String::new(),
-            ),
-            Self::TooLarge {
-                path,
-                n_bytes,
-                limit,
-            } => (
-                path.display().to_string(),
-                format!("{n_bytes} bytes"),
-                format!("{limit} bytes"),
-            ),
-            Self::Format { path, expected } => (
-                path.display().to_string(),
-                "unknown kind of file".into(),
-                (*expected).into(),
-            ),
+            Self::Io { path, source, .. } => {
+                (path.display().to_string(), source.to_string(), String::new())
+            }
+            Self::TooLarge { path, n_bytes, limit } => {
+                (path.display().to_string(), format!("{n_bytes} bytes"), format!("{limit} bytes"))
+            }
+            Self::Format { path, expected } => {
+                (path.display().to_string(), "unknown kind of file".into(), (*expected).into())
+            }
             Self::NoMachine { name, presets } => {
                 ("--machine".into(), name.clone(), presets.clone())
             }
@@ -149,11 +139,9 @@ impl Error {
                 let (place, value, limit) = source.fault();
                 (format!("{}: {place}", path.display()), value, limit)
             }
-            Self::PlanId {
-                path,
-                found,
-                claimed,
-            } => (path.display().to_string(), found.clone(), claimed.clone()),
+            Self::PlanId { path, found, claimed } => {
+                (path.display().to_string(), found.clone(), claimed.clone())
+            }
             Self::Lay(error) => error.fault(),
             Self::Plan(error) => error.fault(),
             Self::Audit(error) => error.fault(),
@@ -161,11 +149,6 @@ impl Error {
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),
             Self::Picture(message) => ("mark.png".into(), message.clone(), String::new()),
         };
-        Fault {
-            message: self.to_string(),
-            place,
-            value,
-            limit,
-        }
+        Fault { message: self.to_string(), place, value, limit }
     }
 }

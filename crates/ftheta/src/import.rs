@@ -23,16 +23,9 @@ pub fn drawing(
 ) -> Result<Imported<Job>, Error> {
     let extension = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
     match extension.as_ref().and_then(|extension| extension.to_str()) {
-        Some("svg" | "svgz") => {
-            svg::read(&bytes(path)?, recipe, options).map_err(|source| Error::Svg {
-                path: path.into(),
-                source,
-            })
-        }
-        _ => Err(Error::Format {
-            path: path.into(),
-            expected: ".svg or .svgz",
-        }),
+        Some("svg" | "svgz") => svg::read(&bytes(path)?, recipe, options)
+            .map_err(|source| Error::Svg { path: path.into(), source }),
+        _ => Err(Error::Format { path: path.into(), expected: ".svg or .svgz" }),
     }
 }
 
@@ -56,24 +49,13 @@ pub fn recipe_for(drawing: &Path, file: Option<&Path>) -> Result<(Recipe, Option
 
 /// The bytes of a file, up to the limit.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    let io = |source| Error::Io {
-        path: path.into(),
-        action: "read",
-        source,
-    };
+    let io = |source| Error::Io { path: path.into(), action: "read", source };
     let file = File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
     // A pipe or device has no length, so the limit is on what is really read.
-    let n_bytes = file
-        .take(N_BYTES_MAX + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io)? as u64;
+    let n_bytes = file.take(N_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(io)? as u64;
     if n_bytes > N_BYTES_MAX {
-        return Err(Error::TooLarge {
-            path: path.into(),
-            n_bytes,
-            limit: N_BYTES_MAX,
-        });
+        return Err(Error::TooLarge { path: path.into(), n_bytes, limit: N_BYTES_MAX });
     }
     Ok(bytes)
 }

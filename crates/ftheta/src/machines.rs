@@ -26,10 +26,7 @@ pub fn source(name: &str) -> Result<(String, String), Error> {
     let looks_like_file = path.extension().is_some() || name.contains(['/', '\\']);
     if !looks_like_file && !path.exists() {
         let presets = machine::PRESETS.join(", ");
-        return Err(Error::NoMachine {
-            name: name.into(),
-            presets,
-        });
+        return Err(Error::NoMachine { name: name.into(), presets });
     }
     Ok((name.into(), import::text(path)?))
 }

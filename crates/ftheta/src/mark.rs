@@ -133,38 +133,19 @@ pub fn mark(
         clip: options.clip,
         ..LayOptions::default()
     };
-    let Imported {
-        value: mut toolpath,
-        warnings,
-    } = lay(job, &lay_options)?;
+    let Imported { value: mut toolpath, warnings } = lay(job, &lay_options)?;
     if let Some(speed_mm_s) = options.speed_mm_s {
-        toolpath
-            .pens
-            .iter_mut()
-            .for_each(|pen| pen.mark_speed_mm_s = speed_mm_s);
+        toolpath.pens.iter_mut().for_each(|pen| pen.mark_speed_mm_s = speed_mm_s);
     }
     observer(Stage::Plan);
     let settings = Settings::new(machine, &recipe.classic)?;
     let draft = classic::draft(toolpath, machine, &settings, options.tolerance_mm)?;
     observer(Stage::Audit);
     let plan = Plan::new(draft)?;
-    let Played {
-        score,
-        dose,
-        states,
-    } = play(&plan, options, observer)?;
+    let Played { score, dose, states } = play(&plan, options, observer)?;
     let times = plan_times(&plan);
     let seed = options.seed;
-    Ok(Marked {
-        plan,
-        settings,
-        times,
-        score,
-        dose,
-        states,
-        seed,
-        warnings,
-    })
+    Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
 }
 
 /// What the twin did with a plan.
@@ -220,11 +201,7 @@ pub fn play(
     scorer.add(&trace);
     states.append(&mut trace.states);
     observer(Stage::Finish);
-    Ok(Played {
-        score: scorer.finish(),
-        dose: twin.into_dose(),
-        states,
-    })
+    Ok(Played { score: scorer.finish(), dose: twin.into_dose(), states })
 }
 
 /// A third of the spot, or coarser where the drawing is so large that memory would not do.
@@ -252,11 +229,7 @@ pub fn plan_times(plan: &PlanDraft) -> PlanTimes {
         |from_ns: u64, to_ns: u64| ((to_ns as i64 - from_ns as i64) + latency_ns) as f64 * 1e-9;
     let mut times = PlanTimes {
         duration_s: seconds(first.on_ns, last.off_ns),
-        mark_s: plan
-            .marks
-            .iter()
-            .map(|mark| seconds(mark.on_ns, mark.off_ns).max(0.0))
-            .sum(),
+        mark_s: plan.marks.iter().map(|mark| seconds(mark.on_ns, mark.off_ns).max(0.0)).sum(),
         ..PlanTimes::default()
     };
     times.jump_s = times.duration_s - times.mark_s;

@@ -22,18 +22,11 @@ impl Output {
     /// # Errors
     /// If the folder cannot be made or written to.
     pub fn new(folder: &Path) -> Result<Self, Error> {
-        let io = |source| Error::Io {
-            path: folder.into(),
-            action: "write to",
-            source,
-        };
+        let io = |source| Error::Io { path: folder.into(), action: "write to", source };
         fs::create_dir_all(folder).map_err(io)?;
         // Fails now, and not after minutes of planning.
         NamedTempFile::new_in(folder).map_err(io)?;
-        Ok(Self {
-            folder: folder.into(),
-            pending: Vec::new(),
-        })
+        Ok(Self { folder: folder.into(), pending: Vec::new() })
     }
 
     /// Where a file of this name will be.
@@ -51,11 +44,7 @@ impl Output {
         write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
     ) -> Result<(), Error> {
         let path = self.path(name);
-        let io = |source| Error::Io {
-            path: path.clone(),
-            action: "write",
-            source,
-        };
+        let io = |source| Error::Io { path: path.clone(), action: "write", source };
         let mut builder = tempfile::Builder::new();
         builder.prefix(".ftheta-").suffix(".part");
         #[cfg(unix)]
@@ -67,9 +56,7 @@ impl Output {
         let file = builder.tempfile_in(&self.folder).map_err(io)?;
         let mut buffered = BufWriter::new(file);
         write(&mut buffered).map_err(io)?;
-        let file = buffered
-            .into_inner()
-            .map_err(|error| io(error.into_error()))?;
+        let file = buffered.into_inner().map_err(|error| io(error.into_error()))?;
         file.as_file().sync_all().map_err(io)?;
         self.pending.push((file, path));
         Ok(())
@@ -80,9 +67,7 @@ impl Output {
     /// # Errors
     /// If it cannot be written.
     pub fn add_plan(&mut self, name: &str, plan: &Plan) -> Result<(), Error> {
-        self.add(name, |mut out| {
-            plan_file::write(plan, &plan.id().to_string(), &mut out)
-        })
+        self.add(name, |mut out| plan_file::write(plan, &plan.id().to_string(), &mut out))
     }
 
     /// Gives all files their names, in the order in which they were written.

@@ -11,18 +11,12 @@ use std::path::Path;
 /// If the file is damaged, does not hold what its id stands for, or the audit refuses it.
 pub fn verify(path: &Path) -> Result<Plan, Error> {
     let text = import::text(path)?;
-    let (draft, claimed) = plan_file::read(&text).map_err(|source| Error::PlanFile {
-        path: path.into(),
-        source,
-    })?;
+    let (draft, claimed) =
+        plan_file::read(&text).map_err(|source| Error::PlanFile { path: path.into(), source })?;
     let plan = Plan::new(draft)?;
     let found = plan.id().to_string();
     if found != claimed {
-        return Err(Error::PlanId {
-            path: path.into(),
-            found,
-            claimed,
-        });
+        return Err(Error::PlanId { path: path.into(), found, claimed });
     }
     Ok(plan)
 }

@@ -82,30 +82,18 @@ fn check(name: &str, as_json: bool) -> Result<(), Error> {
     let rows = [
         ("servo_lag_us", gains.lag_s(&galvo) * 1e6),
         ("acceleration_max_rad_s2", acceleration_rad_s2),
-        (
-            "coil_time_constant_us",
-            scanner.inductance_h / scanner.resistance_ohm * 1e6,
-        ),
+        ("coil_time_constant_us", scanner.inductance_h / scanner.resistance_ohm * 1e6),
         ("field_mm_per_rad", scale_mm),
-        (
-            "word_step_um",
-            machine.output.word_step_rad() * scale_mm * 1e3,
-        ),
+        ("word_step_um", machine.output.word_step_rad() * scale_mm * 1e3),
         ("spot_diameter_um", laser.spot_diameter_mm * 1e3),
         (
             "rayleigh_range_mm",
-            rayleigh_range_mm(
-                laser.wavelength_nm,
-                laser.beam_quality_m2,
-                laser.spot_diameter_mm,
-            ),
+            rayleigh_range_mm(laser.wavelength_nm, laser.beam_quality_m2, laser.spot_diameter_mm),
         ),
     ];
     if as_json {
-        let mut object: Value = rows
-            .iter()
-            .map(|&(key, value)| (key.to_owned(), Value::from(value)))
-            .collect();
+        let mut object: Value =
+            rows.iter().map(|&(key, value)| (key.to_owned(), Value::from(value))).collect();
         object["name"] = json!(machine.name);
         json::print(&object);
         return Ok(());
@@ -114,10 +102,7 @@ fn check(name: &str, as_json: bool) -> Result<(), Error> {
         Lens::FTheta { .. } => "F-theta lens",
         Lens::PostObjective { .. } => "post-objective",
     };
-    println!(
-        "{}: {lens}, field {} mm: good",
-        machine.name, machine.optics.field_mm
-    );
+    println!("{}: {lens}, field {} mm: good", machine.name, machine.optics.field_mm);
     for (key, value) in rows {
         println!("  {key:24} {value:.6}");
     }

@@ -39,12 +39,7 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
         progress.observe(stage);
     })?;
     progress.enter("write");
-    let warnings: Vec<Warning> = drawing
-        .warnings
-        .iter()
-        .chain(&marked.warnings)
-        .cloned()
-        .collect();
+    let warnings: Vec<Warning> = drawing.warnings.iter().chain(&marked.warnings).cloned().collect();
     let files = ftheta::output::write_all(&mut output, &title(arguments), &marked, &warnings)?;
     output.publish()?;
     let stages = progress.finish();
@@ -71,10 +66,7 @@ fn title(arguments: &Mark) -> String {
 }
 
 fn folder(arguments: &Mark) -> PathBuf {
-    arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("out").join(title(arguments)))
+    arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(title(arguments)))
 }
 
 fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &[(&str, String)]) {
@@ -114,10 +106,8 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
     for (kind, path) in files {
         println!("{kind:8} {path}");
     }
-    let stages: Vec<String> = stages
-        .iter()
-        .map(|(name, time_s)| format!("{name} {time_s:.2} s"))
-        .collect();
+    let stages: Vec<String> =
+        stages.iter().map(|(name, time_s)| format!("{name} {time_s:.2} s")).collect();
     println!("took     {}", stages.join(", "));
 }
 

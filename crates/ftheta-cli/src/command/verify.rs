@@ -17,17 +17,8 @@ pub fn run(arguments: &Verify, as_json: bool) -> Result<(), Error> {
         }));
         return Ok(());
     }
-    println!(
-        "plan {} for {} holds every limit",
-        plan.id(),
-        plan.machine.name
-    );
-    println!(
-        "{} marks, {:.3} s, {} samples",
-        plan.marks.len(),
-        times.duration_s,
-        plan.n_samples()
-    );
+    println!("plan {} for {} holds every limit", plan.id(), plan.machine.name);
+    println!("{} marks, {:.3} s, {} samples", plan.marks.len(), times.duration_s, plan.n_samples());
     super::mark::print_limits(plan.limits());
     Ok(())
 }

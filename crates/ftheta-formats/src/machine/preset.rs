@@ -37,10 +37,7 @@ pub fn preset_text(name: &str) -> Option<String> {
     };
     let (scanner, lens) = full.split_once('-')?;
     let find = |table: &[(&str, &'static str)], name: &str| {
-        table
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(_, text)| *text)
+        table.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
     };
     let (scanner, lens) = (find(&SCANNERS, scanner)?, find(&LENSES, lens)?);
     Some(format!("name = \"{full}\"\n\n{scanner}\n{lens}\n{OUTPUT}"))

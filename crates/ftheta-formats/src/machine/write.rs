@@ -15,21 +15,9 @@ pub fn to_toml(machine: &Machine) -> String {
     laser(machine, &mut out);
     let output = &machine.output;
     out.push_str("\n[output]\n");
-    row(
-        &mut out,
-        "period_us",
-        f64::from(output.period_ns) * 1e-3,
-        |us| (us * 10.0).round() * 0.1,
-    );
-    row(&mut out, "word_bits", f64::from(output.word_bits), |bits| {
-        bits
-    });
-    row(
-        &mut out,
-        "word_range_deg",
-        output.word_range_rad.to_degrees(),
-        f64::to_radians,
-    );
+    row(&mut out, "period_us", f64::from(output.period_ns) * 1e-3, |us| (us * 10.0).round() * 0.1);
+    row(&mut out, "word_bits", f64::from(output.word_bits), |bits| bits);
+    row(&mut out, "word_range_deg", output.word_range_rad.to_degrees(), f64::to_radians);
     let drive = match output.drive {
         Drive::ServoKnown => "servo-known",
         Drive::Voltage => "voltage",
@@ -42,24 +30,9 @@ pub fn to_toml(machine: &Machine) -> String {
 fn scanner(machine: &Machine, out: &mut String) {
     let scanner = &machine.scanner;
     out.push_str("\n[scanner]\n");
-    scaled(
-        out,
-        "rotor_inertia_g_cm2",
-        scanner.rotor_inertia_kg_m2,
-        G_CM2,
-    );
-    scaled(
-        out,
-        "mirror_inertia_g_cm2",
-        scanner.mirror_inertia_kg_m2,
-        G_CM2,
-    );
-    scaled(
-        out,
-        "torque_constant_mn_m_a",
-        scanner.torque_constant_n_m_a,
-        1e-3,
-    );
+    scaled(out, "rotor_inertia_g_cm2", scanner.rotor_inertia_kg_m2, G_CM2);
+    scaled(out, "mirror_inertia_g_cm2", scanner.mirror_inertia_kg_m2, G_CM2);
+    scaled(out, "torque_constant_mn_m_a", scanner.torque_constant_n_m_a, 1e-3);
     scaled(out, "coil_resistance_ohm", scanner.resistance_ohm, 1.0);
     scaled(out, "coil_inductance_uh", scanner.inductance_h, 1e-6);
     scaled(out, "torsional_mode_hz", scanner.torsional_mode_hz, 1.0);
@@ -74,20 +47,12 @@ fn scanner(machine: &Machine, out: &mut String) {
     scaled(out, "kt_uncertainty", scanner.kt_uncertainty, 1.0);
     out.push_str("\n[scanner.servo]\n");
     match scanner.servo {
-        Servo::StateFeedback {
-            velocity_weight_s,
-            lag_s,
-        } => {
+        Servo::StateFeedback { velocity_weight_s, lag_s } => {
             text(out, "kind", "state-feedback");
             scaled(out, "velocity_weight_us", velocity_weight_s, 1e-6);
             scaled(out, "lag_us", lag_s, 1e-6);
         }
-        Servo::Pid {
-            bandwidth_hz,
-            damping,
-            integral_time_s,
-            current_bandwidth_hz,
-        } => {
+        Servo::Pid { bandwidth_hz, damping, integral_time_s, current_bandwidth_hz } => {
             text(out, "kind", "pid");
             scaled(out, "bandwidth_hz", bandwidth_hz, 1.0);
             scaled(out, "damping", damping, 1.0);
@@ -111,10 +76,7 @@ fn optics(machine: &Machine, out: &mut String) {
             text(out, "kind", "f-theta");
             let _ = writeln!(out, "coefficients_mm = {coefficients_mm:?}");
         }
-        Lens::PostObjective {
-            mirror_distance_mm,
-            working_distance_mm,
-        } => {
+        Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
             text(out, "kind", "post-objective");
             scaled(out, "mirror_distance_mm", *mirror_distance_mm, 1.0);
             scaled(out, "working_distance_mm", *working_distance_mm, 1.0);
@@ -136,10 +98,9 @@ fn laser(machine: &Machine, out: &mut String) {
     scaled(out, "beam_diameter_mm", laser.beam_diameter_mm, 1.0);
     scaled(out, "spot_diameter_um", laser.spot_diameter_mm, 1e-3);
     scaled(out, "power_max_w", laser.power_max_w, 1.0);
-    for (key, time_ns) in [
-        ("on_latency_us", laser.on_latency_ns),
-        ("off_latency_us", laser.off_latency_ns),
-    ] {
+    for (key, time_ns) in
+        [("on_latency_us", laser.on_latency_ns), ("off_latency_us", laser.off_latency_ns)]
+    {
         row(out, key, time_ns as f64 * 1e-3, |us| (us * 1e3).round());
     }
     let _ = writeln!(out, "power_modulated = {}", laser.power_modulated);

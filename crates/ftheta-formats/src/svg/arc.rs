@@ -29,11 +29,8 @@ pub fn append_svg_arc(path: &mut BezPath, arc: &SvgArc, mm_per_unit: f64) {
 
 /// Appends an arc in user units; the path's current point is its start.
 pub fn append_arc(path: &mut BezPath, arc: Arc, mm_per_unit: f64) {
-    let scaled = Arc {
-        center: scale(arc.center, mm_per_unit),
-        radii: arc.radii * mm_per_unit,
-        ..arc
-    };
+    let scaled =
+        Arc { center: scale(arc.center, mm_per_unit), radii: arc.radii * mm_per_unit, ..arc };
     append(path, &scaled, 1.0 / mm_per_unit);
 }
 
@@ -48,11 +45,7 @@ fn append(path: &mut BezPath, arc_mm: &Arc, units_per_mm: f64) {
     let radius_mm = arc_mm.radii.x.max(arc_mm.radii.y);
     let tolerance_mm = TOLERANCE_MM.max(RELATIVE_TOLERANCE * radius_mm);
     arc_mm.to_cubic_beziers(tolerance_mm, |p1, p2, p3| {
-        path.curve_to(
-            scale(p1, units_per_mm),
-            scale(p2, units_per_mm),
-            scale(p3, units_per_mm),
-        );
+        path.curve_to(scale(p1, units_per_mm), scale(p2, units_per_mm), scale(p3, units_per_mm));
     });
 }
 

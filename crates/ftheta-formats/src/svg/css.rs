@@ -38,8 +38,7 @@ impl<'a> StyleSheets<'a> {
 
     /// Brings the rules into order; call once after the last [`StyleSheets::add`].
     pub fn sort(&mut self) {
-        self.rules
-            .sort_by_cached_key(|rule| rule.selector.specificity());
+        self.rules.sort_by_cached_key(|rule| rule.selector.specificity());
         for (index, rule) in self.rules.iter().enumerate() {
             match key_of(&rule.selector.to_string()) {
                 Some(key) => self.by_key.entry(key).or_default().push(index),
@@ -59,18 +58,12 @@ impl<'a> StyleSheets<'a> {
         if let Some(id) = plain_attribute(node, "id") {
             look_up(&format!("#{id}"));
         }
-        for class in plain_attribute(node, "class")
-            .unwrap_or("")
-            .split_ascii_whitespace()
-        {
+        for class in plain_attribute(node, "class").unwrap_or("").split_ascii_whitespace() {
             look_up(&format!(".{class}"));
         }
         found.sort_unstable();
         found.dedup();
-        let element = Element {
-            node,
-            n_steps: &self.n_steps,
-        };
+        let element = Element { node, n_steps: &self.n_steps };
         for rule in found.into_iter().map(|index| &self.rules[index]) {
             if rule.selector.matches(&element) {
                 rule.declarations.iter().for_each(&mut take);

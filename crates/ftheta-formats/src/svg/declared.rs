@@ -72,10 +72,7 @@ impl<'a> Declared<'a> {
             important: [false; N_PROPERTIES],
             bad_paint: None,
         };
-        for attribute in node
-            .attributes()
-            .filter(|attribute| attribute.namespace().is_none())
-        {
+        for attribute in node.attributes().filter(|attribute| attribute.namespace().is_none()) {
             declared.set(attribute.name(), attribute.value(), false);
         }
         style_sheets.declare(node, |declaration| {

@@ -23,10 +23,7 @@ pub fn text<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Cow<'a, str>, SvgErr
 
 fn plain_text<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Cow<'a, str>, SvgError> {
     if limits.n_bytes_max < bytes.len() {
-        return Err(SvgError::TooLarge {
-            n_bytes: bytes.len(),
-            limit: limits.n_bytes_max,
-        });
+        return Err(SvgError::TooLarge { n_bytes: bytes.len(), limit: limits.n_bytes_max });
     }
     let text = match bytes {
         [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest)?,
@@ -46,9 +43,7 @@ fn unpack(bytes: &[u8], limits: &Limits) -> Result<Vec<u8>, SvgError> {
     flate2::read::MultiGzDecoder::new(bytes)
         .take(limits.n_bytes_max as u64 + 1)
         .read_to_end(&mut unpacked)
-        .map_err(|error| SvgError::Compressed {
-            message: error.to_string(),
-        })?;
+        .map_err(|error| SvgError::Compressed { message: error.to_string() })?;
     Ok(unpacked)
 }
 
@@ -56,12 +51,10 @@ fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, SvgError> {
     match str::from_utf8(bytes) {
         Ok(text) => Ok(Cow::Borrowed(text)),
         // Each byte of Latin-1 is the code point of the same number.
-        Err(_) if declares_latin1(bytes) => Ok(Cow::Owned(
-            bytes.iter().map(|&byte| char::from(byte)).collect(),
-        )),
-        Err(error) => Err(SvgError::NotText {
-            offset: error.valid_up_to(),
-        }),
+        Err(_) if declares_latin1(bytes) => {
+            Ok(Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()))
+        }
+        Err(error) => Err(SvgError::NotText { offset: error.valid_up_to() }),
     }
 }
 

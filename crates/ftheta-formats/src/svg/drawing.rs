@@ -46,9 +46,7 @@ pub fn parse<'a>(text: &'a str, limits: &Limits) -> Result<Document<'a>, SvgErro
             limit: limits.n_nodes_max as usize,
         },
         roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream => {
-            SvgError::Truncated {
-                line: text.lines().count() as u32,
-            }
+            SvgError::Truncated { line: text.lines().count() as u32 }
         }
         error => {
             let roxmltree::TextPos { row, col } = error.pos();
@@ -92,13 +90,7 @@ impl<'a> Drawing<'a> {
                 Some(before)
             })
             .collect();
-        Self {
-            tree,
-            ids,
-            breaks_before,
-            style_sheets,
-            inkscape_layers,
-        }
+        Self { tree, ids, breaks_before, style_sheets, inkscape_layers }
     }
 
     /// The outermost element.

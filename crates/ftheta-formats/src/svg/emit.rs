@@ -32,9 +32,7 @@ pub fn shape<'a>(
         let may_be_empty = matches!(node.tag_name().name(), "path" | "polyline" | "polygon");
         if !faulty && !may_be_empty {
             let place = reader.drawing.place(node);
-            reader
-                .warnings
-                .add(place, "its size is not above 0, left out");
+            reader.warnings.add(place, "its size is not above 0, left out");
         }
         return Ok(());
     }
@@ -93,15 +91,11 @@ fn color_of<'a>(
         StylePaint::Server { color_rgb, id } => {
             let [red, green, blue] = color_rgb;
             let color = format!("#{red:02x}{green:02x}{blue:02x}");
-            (
-                Some(color_rgb),
-                format!("paint \"{id}\" is taken as the plain colour {color}"),
-            )
+            (Some(color_rgb), format!("paint \"{id}\" is taken as the plain colour {color}"))
         }
-        StylePaint::Missing(id) => (
-            None,
-            format!("paint \"{id}\" is not in this file, taken as none"),
-        ),
+        StylePaint::Missing(id) => {
+            (None, format!("paint \"{id}\" is not in this file, taken as none"))
+        }
     };
     reader.warnings.add(reader.drawing.place(node), message);
     color_rgb
@@ -117,12 +111,7 @@ fn with_dashes<'a>(
     if style.dashes.is_empty() {
         return path.clone();
     }
-    let cut = dashed(
-        path,
-        &style.dashes,
-        style.dash_offset,
-        context.mm_per_unit(),
-    );
+    let cut = dashed(path, &style.dashes, style.dash_offset, context.mm_per_unit());
     cut.unwrap_or_else(|| {
         let message = "more than a million dashes, marked as a full line";
         reader.warnings.add(reader.drawing.place(node), message);
@@ -140,9 +129,7 @@ fn add<'a>(
     path.apply_affine(context.field_from_user);
     let bounds = path.control_box();
     let within = |value: f64| value.abs() <= COORDINATE_MAX_MM;
-    let inside = [bounds.x0, bounds.y0, bounds.x1, bounds.y1]
-        .into_iter()
-        .all(within);
+    let inside = [bounds.x0, bounds.y0, bounds.x1, bounds.y1].into_iter().all(within);
     let fault = if path.is_empty() || !path.is_finite() || !inside {
         Some("coordinates beyond 1 km or not finite, left out")
     } else if bounds.width() == 0.0 && bounds.height() == 0.0 {
@@ -160,12 +147,7 @@ fn add<'a>(
         return Err(too_many_curves(reader, node));
     }
     let pen_index = reader.marking.pen_index(color_rgb, context.scope);
-    let shape = Shape {
-        source: reader.drawing.place(node),
-        path,
-        paint,
-        pen_index,
-    };
+    let shape = Shape { source: reader.drawing.place(node), path, paint, pen_index };
     reader.marking.add(context.scope, shape);
     Ok(())
 }

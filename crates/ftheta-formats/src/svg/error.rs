@@ -95,22 +95,16 @@ impl SvgError {
         let above_zero = "above 0".to_owned();
         match self {
             Self::Empty => (String::new(), "0 bytes".into(), String::new()),
-            Self::TooLarge { n_bytes, limit } => (
-                String::new(),
-                format!("{n_bytes} bytes"),
-                format!("{limit} bytes"),
-            ),
+            Self::TooLarge { n_bytes, limit } => {
+                (String::new(), format!("{n_bytes} bytes"), format!("{limit} bytes"))
+            }
             Self::Compressed { message } => (String::new(), message.clone(), String::new()),
-            Self::NotText { offset } => (
-                format!("byte {offset}"),
-                String::new(),
-                "UTF-8 or UTF-16".into(),
-            ),
-            Self::Xml { line, column, .. } => (
-                format!("line {line}, column {column}"),
-                String::new(),
-                String::new(),
-            ),
+            Self::NotText { offset } => {
+                (format!("byte {offset}"), String::new(), "UTF-8 or UTF-16".into())
+            }
+            Self::Xml { line, column, .. } => {
+                (format!("line {line}, column {column}"), String::new(), String::new())
+            }
             Self::Truncated { line } => (format!("line {line}"), String::new(), "</svg>".into()),
             Self::NotSvg { tag } => (String::new(), format!("<{tag}>"), "<svg>".into()),
             Self::TooDeep { place, limit } => {

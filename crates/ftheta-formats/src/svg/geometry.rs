@@ -34,11 +34,7 @@ pub struct Scale {
 
 /// The geometry of a shape element; `None` for other elements.
 pub fn of(node: Node<'_>, tag: &str, scale: &Scale) -> Option<Geometry> {
-    let mut lengths = Lengths {
-        node,
-        base: scale.base,
-        fault: None,
-    };
+    let mut lengths = Lengths { node, base: scale.base, fault: None };
     let mut geometry = match tag {
         "path" => path(node, scale),
         "rect" => rect(&mut lengths, scale.mm_per_unit),
@@ -120,9 +116,7 @@ fn path(node: Node<'_>, scale: &Scale) -> Geometry {
     Geometry {
         path: data.path,
         area: true,
-        fault: data
-            .error
-            .map(|error| format!("bad path data, kept up to the error: {error}")),
+        fault: data.error.map(|error| format!("bad path data, kept up to the error: {error}")),
         cut: data.cut,
     }
 }
@@ -133,10 +127,7 @@ fn line(lengths: &mut Lengths<'_>) -> Geometry {
     let mut path = BezPath::new();
     path.move_to(end("x1", "y1"));
     path.line_to(end("x2", "y2"));
-    Geometry {
-        path,
-        ..Geometry::default()
-    }
+    Geometry { path, ..Geometry::default() }
 }
 
 fn polyline(node: Node<'_>, closed: bool) -> Geometry {
@@ -154,35 +145,20 @@ fn polyline(node: Node<'_>, closed: bool) -> Geometry {
     } else if closed {
         path.close_path();
     }
-    Geometry {
-        path,
-        area: true,
-        ..Geometry::default()
-    }
+    Geometry { path, area: true, ..Geometry::default() }
 }
 
 fn ellipse(lengths: &mut Lengths<'_>, radii: Vec2, mm_per_unit: f64) -> Geometry {
-    let center = Point::new(
-        lengths.get("cx", Direction::X),
-        lengths.get("cy", Direction::Y),
-    );
+    let center = Point::new(lengths.get("cx", Direction::X), lengths.get("cy", Direction::Y));
     let mut path = BezPath::new();
     if 0.0 < radii.x && 0.0 < radii.y {
         let start = center + Vec2::new(radii.x, 0.0);
         path.move_to(start);
-        append_arc(
-            &mut path,
-            Arc::new(center, radii, 0.0, TAU, 0.0),
-            mm_per_unit,
-        );
+        append_arc(&mut path, Arc::new(center, radii, 0.0, TAU, 0.0), mm_per_unit);
         set_last_point(&mut path, start);
         path.close_path();
     }
-    Geometry {
-        path,
-        area: true,
-        ..Geometry::default()
-    }
+    Geometry { path, area: true, ..Geometry::default() }
 }
 
 fn rect(lengths: &mut Lengths<'_>, mm_per_unit: f64) -> Geometry {
@@ -212,11 +188,7 @@ fn rect(lengths: &mut Lengths<'_>, mm_per_unit: f64) -> Geometry {
             path.close_path();
         }
     }
-    Geometry {
-        path,
-        area: true,
-        ..Geometry::default()
-    }
+    Geometry { path, area: true, ..Geometry::default() }
 }
 
 /// A rectangle with quarter ellipses as corners, in the order and direction that SVG states.
@@ -235,11 +207,7 @@ fn rounded(path: &mut BezPath, corners: [Point; 4], radii: Vec2, mm_per_unit: f6
         path.line_to(corner - arriving);
         let start_angle = FRAC_PI_2 * (index as f64 - 2.0);
         let center = corner - arriving + leaving;
-        append_arc(
-            path,
-            Arc::new(center, radii, start_angle, FRAC_PI_2, 0.0),
-            mm_per_unit,
-        );
+        append_arc(path, Arc::new(center, radii, start_angle, FRAC_PI_2, 0.0), mm_per_unit);
         set_last_point(path, corner + leaving);
     }
     path.close_path();

@@ -33,9 +33,8 @@ fn decoded(id: &str) -> String {
     let mut rest = id;
     while let Some((before, code)) = rest.split_once("_x") {
         let end = code.find('_').filter(|end| (1..=6).contains(end));
-        let letter = end
-            .and_then(|end| u32::from_str_radix(&code[..end], 16).ok())
-            .and_then(char::from_u32);
+        let letter =
+            end.and_then(|end| u32::from_str_radix(&code[..end], 16).ok()).and_then(char::from_u32);
         name.push_str(before);
         match (letter, end) {
             (Some(letter), Some(end)) => {

@@ -66,11 +66,7 @@ pub fn absolute_mm(length: Length) -> Option<f64> {
 
 /// The size of the default font, 16 px, or half of it.
 fn absolute_em_mm(unit: LengthUnit) -> f64 {
-    if unit == LengthUnit::Em {
-        16.0 * PX_MM
-    } else {
-        8.0 * PX_MM
-    }
+    if unit == LengthUnit::Em { 16.0 * PX_MM } else { 8.0 * PX_MM }
 }
 
 /// A length and whether its unit is one that SVG knows; `None` if it does not start with a number.

@@ -41,11 +41,7 @@ impl<'r> Marking<'r> {
     ///
     /// * `names`: the name to show first; a rule may mean any of them
     pub fn open(&mut self, around: Option<ScopeIndex>, names: Vec<String>) -> ScopeIndex {
-        self.scopes.push(Scope {
-            around,
-            names,
-            layer_index: None,
-        });
+        self.scopes.push(Scope { around, names, layer_index: None });
         ScopeIndex(self.scopes.len() - 1)
     }
 
@@ -54,10 +50,7 @@ impl<'r> Marking<'r> {
         let rules = &self.recipe.pens;
         let found = rules.iter().position(|rule| {
             rule.color_rgb.is_none_or(|color| color == color_rgb)
-                && rule
-                    .layer
-                    .as_ref()
-                    .is_none_or(|layer| self.is_on(scope, layer))
+                && rule.layer.as_ref().is_none_or(|layer| self.is_on(scope, layer))
         });
         found.unwrap_or_else(|| {
             let next = rules.len() + self.extra_pens.len();
@@ -94,11 +87,7 @@ impl<'r> Marking<'r> {
     /// The job on a page.
     pub fn into_job(self, page_mm: [f64; 2]) -> Job {
         let recipe_pens = self.recipe.pens.iter().map(|rule| rule.pen.clone());
-        Job {
-            pens: recipe_pens.chain(self.extra_pens).collect(),
-            layers: self.layers,
-            page_mm,
-        }
+        Job { pens: recipe_pens.chain(self.extra_pens).collect(), layers: self.layers, page_mm }
     }
 
     fn is_on(&self, scope: ScopeIndex, layer: &str) -> bool {

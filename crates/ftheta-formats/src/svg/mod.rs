@@ -96,9 +96,7 @@ pub fn read(
     let drawing = Drawing::new(&tree);
     let root = drawing.root();
     if tag_of(root) != Some("svg") {
-        return Err(SvgError::NotSvg {
-            tag: root.tag_name().name().into(),
-        });
+        return Err(SvgError::NotSvg { tag: root.tag_name().name().into() });
     }
     let mut reader = Reader::new(&drawing, recipe, options.limits);
     if options.system_fonts {
@@ -123,9 +121,7 @@ pub fn read(
     };
     reader.read(&page)?;
     if reader.marking.is_empty() {
-        return Err(SvgError::NothingToMark {
-            reason: reader.tally.reason(),
-        });
+        return Err(SvgError::NothingToMark { reason: reader.tally.reason() });
     }
     Ok(Imported {
         value: reader.marking.into_job(page.size_mm),
@@ -145,7 +141,5 @@ fn content_bounds(
     job.shapes()
         .map(|shape| shape.path.bounding_box())
         .reduce(|bounds, shape| bounds.union(shape))
-        .ok_or_else(|| SvgError::NothingToMark {
-            reason: reader.tally.reason(),
-        })
+        .ok_or_else(|| SvgError::NothingToMark { reason: reader.tally.reason() })
 }

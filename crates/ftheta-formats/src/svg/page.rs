@@ -64,11 +64,7 @@ impl Page {
 
     /// The user units of a file that states no page, y down, unscaled.
     pub fn bare() -> Self {
-        Self {
-            size_mm: [0.0, 0.0],
-            field_from_user: Affine::IDENTITY,
-            viewport: [100.0, 100.0],
-        }
+        Self { size_mm: [0.0, 0.0], field_from_user: Affine::IDENTITY, viewport: [100.0, 100.0] }
     }
 
     fn new(size_mm: [f64; 2], view_box: ViewBox, aspect: AspectRatio) -> Self {
@@ -114,11 +110,7 @@ impl Page {
 pub fn view_box_map(size: [f64; 2], view_box: ViewBox, aspect: AspectRatio) -> Affine {
     let mut scale = [size[0] / view_box.w, size[1] / view_box.h];
     if aspect.align != Align::None {
-        let uniform = if aspect.slice {
-            scale[0].max(scale[1])
-        } else {
-            scale[0].min(scale[1])
-        };
+        let uniform = if aspect.slice { scale[0].max(scale[1]) } else { scale[0].min(scale[1]) };
         scale = [uniform, uniform];
     }
     let (part_x, part_y) = match aspect.align {
@@ -154,10 +146,7 @@ pub fn view_box_of(node: Node<'_>) -> Result<Option<ViewBox>, SvgError> {
     };
     ViewBox::from_str(text)
         .map(Some)
-        .map_err(|_| SvgError::Page {
-            attribute: "viewBox",
-            value: text.into(),
-        })
+        .map_err(|_| SvgError::Page { attribute: "viewBox", value: text.into() })
 }
 
 fn side_mm(
@@ -171,16 +160,10 @@ fn side_mm(
     if text.trim() == "auto" {
         return Ok(None);
     }
-    let wrong = || SvgError::Page {
-        attribute,
-        value: text.into(),
-    };
+    let wrong = || SvgError::Page { attribute, value: text.into() };
     let (length, unit_known) = length::parse(text).ok_or_else(wrong)?;
     if !unit_known {
-        warnings.add(
-            "<svg>",
-            format!("unknown unit in {attribute}=\"{text}\", taken as px"),
-        );
+        warnings.add("<svg>", format!("unknown unit in {attribute}=\"{text}\", taken as px"));
     }
     match length::absolute_mm(length) {
         Some(side_mm) if 0.0 < side_mm && side_mm.is_finite() => Ok(Some(side_mm)),
@@ -193,9 +176,7 @@ fn side_mm(
 pub fn warn_of_dpi(root: Node<'_>, size_mm: [f64; 2], warnings: &mut Warnings) {
     let in_pixels = ["width", "height"].iter().any(|side| {
         plain_attribute(root, side).is_none_or(|text| {
-            text.trim_end()
-                .ends_with(|last: char| last.is_ascii_digit())
-                || text.ends_with("px")
+            text.trim_end().ends_with(|last: char| last.is_ascii_digit()) || text.ends_with("px")
         })
     });
     let from_illustrator = root

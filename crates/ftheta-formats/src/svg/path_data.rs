@@ -68,11 +68,7 @@ struct Pen {
 
 impl Pen {
     fn take(&mut self, segment: PathSegment) {
-        let origin = if segment.is_abs() {
-            Vec2::ZERO
-        } else {
-            self.current.to_vec2()
-        };
+        let origin = if segment.is_abs() { Vec2::ZERO } else { self.current.to_vec2() };
         let at = |x: f64, y: f64| Point::new(x, y) + origin;
         match segment {
             PathSegment::MoveTo { x, y, .. } => {
@@ -89,15 +85,9 @@ impl Pen {
             PathSegment::VerticalLineTo { y, .. } => {
                 self.line_to(Point::new(self.current.x, y + origin.y));
             }
-            PathSegment::CurveTo {
-                x1,
-                y1,
-                x2,
-                y2,
-                x,
-                y,
-                ..
-            } => self.cubic_to(at(x1, y1), at(x2, y2), at(x, y)),
+            PathSegment::CurveTo { x1, y1, x2, y2, x, y, .. } => {
+                self.cubic_to(at(x1, y1), at(x2, y2), at(x, y))
+            }
             PathSegment::SmoothCurveTo { x2, y2, x, y, .. } => {
                 let first = self.reflected_control(Last::Cubic);
                 self.cubic_to(first, at(x2, y2), at(x, y));
@@ -110,14 +100,7 @@ impl Pen {
                 self.quadratic_to(control, at(x, y));
             }
             PathSegment::EllipticalArc {
-                rx,
-                ry,
-                x_axis_rotation,
-                large_arc,
-                sweep,
-                x,
-                y,
-                ..
+                rx, ry, x_axis_rotation, large_arc, sweep, x, y, ..
             } => self.arc_to(SvgArc {
                 from: self.current,
                 to: at(x, y),
@@ -178,10 +161,6 @@ impl Pen {
     }
 
     fn reflected_control(&self, same: Last) -> Point {
-        if self.last == same {
-            self.current + (self.current - self.control)
-        } else {
-            self.current
-        }
+        if self.last == same { self.current + (self.current - self.control) } else { self.current }
     }
 }

@@ -89,11 +89,7 @@ impl Scan<'_> {
         } else {
             return Ok(tag.end);
         };
-        Err(SvgError::TooMany {
-            place: line_of(self.bytes, found),
-            what,
-            limit,
-        })
+        Err(SvgError::TooMany { place: line_of(self.bytes, found), what, limit })
     }
 
     fn check_entities(&self, limits: &Limits) -> Result<(), SvgError> {
@@ -101,14 +97,9 @@ impl Scan<'_> {
             return Ok(());
         }
         let n_references = self.bytes.iter().filter(|&&byte| byte == b'&').count();
-        let n_per_reference = if self.entities_nested {
-            N_NESTED_REFERENCES
-        } else {
-            1
-        };
-        let n_bytes = n_references
-            .saturating_mul(self.entity_bytes_max)
-            .saturating_mul(n_per_reference);
+        let n_per_reference = if self.entities_nested { N_NESTED_REFERENCES } else { 1 };
+        let n_bytes =
+            n_references.saturating_mul(self.entity_bytes_max).saturating_mul(n_per_reference);
         if n_bytes <= limits.n_bytes_max {
             return Ok(());
         }
@@ -130,12 +121,8 @@ struct Tag {
 
 impl Tag {
     fn at(bytes: &[u8], found: usize) -> Self {
-        let mut tag = Self {
-            end: bytes.len(),
-            n_attributes: 0,
-            n_namespaces: 0,
-            self_closing: false,
-        };
+        let mut tag =
+            Self { end: bytes.len(), n_attributes: 0, n_namespaces: 0, self_closing: false };
         let mut quote = None;
         for (index, &byte) in bytes.iter().enumerate().skip(found) {
             match (quote, byte) {

@@ -118,10 +118,7 @@ impl<'a> Style<'a> {
         if let Some(opacity) = declared.get(Property::FillOpacity).and_then(parse_opacity) {
             self.fill_opacity = opacity;
         }
-        if let Some(opacity) = declared
-            .get(Property::StrokeOpacity)
-            .and_then(parse_opacity)
-        {
+        if let Some(opacity) = declared.get(Property::StrokeOpacity).and_then(parse_opacity) {
             self.stroke_opacity = opacity;
         }
         if let Some(text) = declared.get(Property::Visibility) {
@@ -137,18 +134,15 @@ impl<'a> Style<'a> {
     }
 
     fn apply_font(&mut self, declared: &Declared<'a>, viewport: [f64; 2]) {
-        let shorthand = declared
-            .get(Property::Font)
-            .and_then(|text| FontShorthand::from_str(text).ok());
-        let size = declared
-            .get(Property::FontSize)
-            .or(shorthand.as_ref().map(|font| font.font_size));
+        let shorthand =
+            declared.get(Property::Font).and_then(|text| FontShorthand::from_str(text).ok());
+        let size =
+            declared.get(Property::FontSize).or(shorthand.as_ref().map(|font| font.font_size));
         if let Some(size) = size.and_then(|text| self.parse_font_size(text, viewport)) {
             self.font_size = size;
         }
-        let family = declared
-            .get(Property::FontFamily)
-            .or(shorthand.as_ref().map(|font| font.font_family));
+        let family =
+            declared.get(Property::FontFamily).or(shorthand.as_ref().map(|font| font.font_family));
         self.font_family = family.unwrap_or(self.font_family);
         let weight = declared
             .get(Property::FontWeight)
@@ -184,28 +178,17 @@ impl<'a> Style<'a> {
 
     /// What relative lengths refer to.
     pub fn length_base(&self, viewport: [f64; 2]) -> LengthBase {
-        LengthBase {
-            font_size: self.font_size,
-            viewport,
-        }
+        LengthBase { font_size: self.font_size, viewport }
     }
 
     /// Paint of areas, `Paint::None` where it cannot be seen.
     pub fn visible_fill(&self) -> Paint<'a> {
-        if self.visible && self.fill_opacity != 0.0 {
-            self.fill
-        } else {
-            Paint::None
-        }
+        if self.visible && self.fill_opacity != 0.0 { self.fill } else { Paint::None }
     }
 
     /// Paint of lines, `Paint::None` where it cannot be seen.
     pub fn visible_stroke(&self) -> Paint<'a> {
-        if self.visible && self.stroke_opacity != 0.0 {
-            self.stroke
-        } else {
-            Paint::None
-        }
+        if self.visible && self.stroke_opacity != 0.0 { self.stroke } else { Paint::None }
     }
 
     fn parse_font_size(&self, text: &str, viewport: [f64; 2]) -> Option<f64> {
@@ -296,20 +279,14 @@ fn rgb(color: Color) -> [u8; 3] {
 }
 
 fn visible_color<'a>(color: Color) -> Paint<'a> {
-    if color.alpha == 0 {
-        Paint::None
-    } else {
-        Paint::Color(rgb(color))
-    }
+    if color.alpha == 0 { Paint::None } else { Paint::Color(rgb(color)) }
 }
 
 /// The first colour of a gradient, which may have its stops from another one.
 fn first_stop(server: Node<'_>, drawing: &Drawing<'_>) -> Option<[u8; 3]> {
     let mut server = drawing.by_id(super::drawing::plain_attribute(server, "id")?)?;
     for _ in 0..N_GRADIENT_LINKS_MAX {
-        let stop = server
-            .children()
-            .find(|child| tag_of(*child) == Some("stop"));
+        let stop = server.children().find(|child| tag_of(*child) == Some("stop"));
         if let Some(stop) = stop {
             let declared = Declared::of(stop, &drawing.style_sheets);
             let color = declared.get(Property::StopColor).and_then(parse_color);

@@ -63,18 +63,9 @@ pub fn mark<'a>(
     node: Node<'a>,
     context: &Context<'a>,
 ) -> Result<(), SvgError> {
-    let mut text = Text {
-        characters: Vec::new(),
-        spans: Vec::new(),
-        placers: Vec::new(),
-    };
+    let mut text = Text { characters: Vec::new(), spans: Vec::new(), placers: Vec::new() };
     span(reader, node, context, &mut text)?;
-    if text
-        .characters
-        .last()
-        .is_some_and(|last| last.letter == ' ')
-        && !preserves_space(node)
-    {
+    if text.characters.last().is_some_and(|last| last.letter == ' ') && !preserves_space(node) {
         text.characters.pop();
     }
     typeset::mark(reader, node, &text)
@@ -86,16 +77,8 @@ fn span<'a>(
     context: &Context<'a>,
     text: &mut Text<'a>,
 ) -> Result<(), SvgError> {
-    let unsupported = [
-        "rotate",
-        "textLength",
-        "lengthAdjust",
-        "dominant-baseline",
-        "writing-mode",
-    ];
-    let found = unsupported
-        .iter()
-        .find(|name| plain_attribute(node, name).is_some());
+    let unsupported = ["rotate", "textLength", "lengthAdjust", "dominant-baseline", "writing-mode"];
+    let found = unsupported.iter().find(|name| plain_attribute(node, name).is_some());
     if let Some(name) = found {
         let message = format!("{name} is ignored");
         reader.warnings.add(reader.drawing.place(node), message);
@@ -151,11 +134,7 @@ impl Text<'_> {
             for placer in &mut self.placers {
                 placer.place_next(&mut place);
             }
-            self.characters.push(Character {
-                letter,
-                span_index,
-                place,
-            });
+            self.characters.push(Character { letter, span_index, place });
         }
     }
 }
@@ -200,9 +179,7 @@ fn lengths<'a>(
 }
 
 fn preserves_space(node: Node<'_>) -> bool {
-    let stated = node
-        .ancestors()
-        .find_map(|element| element.attribute((XML_NAMESPACE, "space")));
+    let stated = node.ancestors().find_map(|element| element.attribute((XML_NAMESPACE, "space")));
     let style = plain_attribute(node, "style").unwrap_or("");
     stated == Some("preserve") || style.contains("white-space:pre")
 }

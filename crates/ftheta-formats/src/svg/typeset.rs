@@ -31,10 +31,7 @@ pub fn mark<'a>(
         let n = 1 + rest[1..].iter().take_while(|next| !absolute(next)).count();
         let (chunk, after) = rest.split_at(n);
         rest = after;
-        let start = Point::new(
-            first.place.x.unwrap_or(pen.x),
-            first.place.y.unwrap_or(pen.y),
-        );
+        let start = Point::new(first.place.x.unwrap_or(pen.x), first.place.y.unwrap_or(pen.y));
         let runs = set_chunk(reader, node, text, (chunk, start));
         let end = runs.last().map_or(start, |run| run.end);
         let anchor = text.spans[first.span_index].1.style.text_anchor;
@@ -71,10 +68,7 @@ fn set_chunk<'a>(
     for characters in chunk.chunk_by(|a, b| a.span_index == b.span_index) {
         let span_index = characters[0].span_index;
         let style = &text.spans[span_index].1.style;
-        let line: String = characters
-            .iter()
-            .map(|character| character.letter)
-            .collect();
+        let line: String = characters.iter().map(|character| character.letter).collect();
         let lettering = set_line(reader, node, &line, style);
         let slanted = style.italic && !is_single_stroke(reader, style);
         let slant = if slanted { ITALIC_SLANT } else { 0.0 };
@@ -96,11 +90,7 @@ fn set_chunk<'a>(
                 pen.x += style.word_spacing;
             }
         }
-        runs.push(Run {
-            span_index,
-            path,
-            end: pen,
-        });
+        runs.push(Run { span_index, path, end: pen });
     }
     runs
 }
@@ -128,9 +118,7 @@ fn mark_run<'a>(
 
 fn is_single_stroke(reader: &Reader<'_, '_>, style: &Style<'_>) -> bool {
     let family = style.font_family.trim_start_matches(['\'', '"', ' ']);
-    let hershey = family
-        .get(..7)
-        .is_some_and(|name| name.eq_ignore_ascii_case("hershey"));
+    let hershey = family.get(..7).is_some_and(|name| name.eq_ignore_ascii_case("hershey"));
     hershey || reader.recipe.text == TextStyle::SingleStroke
 }
 
@@ -148,10 +136,9 @@ fn set_line<'a>(
         let typeface = Typeface::bundled(style.font_weight);
         (typeface.set(line), BUNDLED_FAMILY)
     };
-    for (characters, fate) in [
-        (&lettering.missing, "left out"),
-        (&lettering.replaced, "spelt with others"),
-    ] {
+    for (characters, fate) in
+        [(&lettering.missing, "left out"), (&lettering.replaced, "spelt with others")]
+    {
         if !characters.is_empty() {
             let mut names: Vec<char> = characters.clone();
             names.sort_unstable();
@@ -169,15 +156,7 @@ fn set_line<'a>(
 fn warn_of_family(reader: &mut Reader<'_, '_>, families: &str) {
     let first = families.split(',').next().unwrap_or("");
     let family = first.trim().trim_matches(['\'', '"']);
-    let generic = [
-        "",
-        "sans-serif",
-        "serif",
-        "monospace",
-        "system-ui",
-        "sans",
-        BUNDLED_FAMILY,
-    ];
+    let generic = ["", "sans-serif", "serif", "monospace", "system-ui", "sans", BUNDLED_FAMILY];
     if !generic.contains(&family) {
         let message = format!("font \"{family}\" is replaced by the bundled {BUNDLED_FAMILY}");
         reader.warnings.add("<text>", message);

@@ -93,8 +93,7 @@ impl<'a, 'r> Reader<'a, 'r> {
             self.children(root, &context)?;
         }
         if self.drawing.style_sheets.incomplete.get() {
-            self.warnings
-                .add("<style>", "too many rules to look at, some were ignored");
+            self.warnings.add("<style>", "too many rules to look at, some were ignored");
         }
         Ok(())
     }
@@ -167,14 +166,9 @@ impl<'a, 'r> Reader<'a, 'r> {
             self.warnings.add(self.drawing.place(node), fault);
         }
         self.warn_of_effects(node, &declared);
-        context
-            .style
-            .apply(&declared, context.viewport, self.drawing);
+        context.style.apply(&declared, context.viewport, self.drawing);
         context.transparent |= is_transparent(&declared);
-        if let Some(text) = declared
-            .get(Property::Transform)
-            .filter(|text| *text != "none")
-        {
+        if let Some(text) = declared.get(Property::Transform).filter(|text| *text != "none") {
             let Some(transform) = transform_of(text) else {
                 self.tally.n_dropped += 1;
                 let message = format!("transform=\"{text}\" cannot be used, left out");
@@ -229,26 +223,19 @@ impl<'a, 'r> Reader<'a, 'r> {
             Vec2::new(x, lengths.get("y", Direction::Y))
         };
         self.warn_of_fault(placed, lengths.fault);
-        let size = [
-            width.unwrap_or(context.viewport[0]),
-            height.unwrap_or(context.viewport[1]),
-        ];
+        let size = [width.unwrap_or(context.viewport[0]), height.unwrap_or(context.viewport[1])];
         context.field_from_user *= Affine::translate(corner);
         let view_box = match view_box_of(content) {
             Ok(view_box) => view_box,
             Err(error) => {
                 self.tally.n_dropped += 1;
-                self.warnings
-                    .add(self.drawing.place(content), error.to_string());
+                self.warnings.add(self.drawing.place(content), error.to_string());
                 return Ok(());
             }
         };
         if !size.iter().all(|side| 0.0 < *side) {
             self.tally.n_dropped += 1;
-            self.warnings.add(
-                self.drawing.place(placed),
-                "its size is not above 0, left out",
-            );
+            self.warnings.add(self.drawing.place(placed), "its size is not above 0, left out");
             return Ok(());
         }
         context.viewport = size;
@@ -278,10 +265,7 @@ impl<'a, 'r> Reader<'a, 'r> {
             return Ok(());
         }
         let mut lengths = self.lengths(node, &context);
-        let corner = Vec2::new(
-            lengths.get("x", Direction::X),
-            lengths.get("y", Direction::Y),
-        );
+        let corner = Vec2::new(lengths.get("x", Direction::X), lengths.get("y", Direction::Y));
         let width = lengths.optional("width", Direction::X);
         let height = lengths.optional("height", Direction::Y);
         self.warn_of_fault(node, lengths.fault);
@@ -324,8 +308,7 @@ impl<'a, 'r> Reader<'a, 'r> {
             Some(geometry) => emit::shape(self, node, geometry, context),
             None => {
                 self.tally.n_dropped += 1;
-                self.warnings
-                    .add(self.drawing.place(node), "unknown element, left out");
+                self.warnings.add(self.drawing.place(node), "unknown element, left out");
                 Ok(())
             }
         }
@@ -333,11 +316,7 @@ impl<'a, 'r> Reader<'a, 'r> {
 
     /// Reads lengths of an element.
     pub fn lengths(&self, node: Node<'a>, context: &Context<'a>) -> Lengths<'a> {
-        Lengths {
-            node,
-            base: context.style.length_base(context.viewport),
-            fault: None,
-        }
+        Lengths { node, base: context.style.length_base(context.viewport), fault: None }
     }
 
     /// Passes a fault of an element's attributes on as a warning.
@@ -365,11 +344,8 @@ fn ignored(tag: &str) -> Option<&'static str> {
 
 /// Whether a child of `<switch>` is for a reader like this one.
 fn switch_takes(child: Node<'_>) -> bool {
-    let language_fits = plain_attribute(child, "systemLanguage").is_none_or(|languages| {
-        languages
-            .split(',')
-            .any(|name| name.trim().starts_with("en"))
-    });
+    let language_fits = plain_attribute(child, "systemLanguage")
+        .is_none_or(|languages| languages.split(',').any(|name| name.trim().starts_with("en")));
     child.is_element()
         && tag_of(child).is_some_and(|tag| ignored(tag).is_none())
         && plain_attribute(child, "requiredExtensions").is_none_or(str::is_empty)

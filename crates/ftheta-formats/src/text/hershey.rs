@@ -124,9 +124,7 @@ fn parse(file: &str) -> Vec<Glyph> {
     let mut glyphs = Vec::new();
     loop {
         let header: Vec<u8> = bytes.by_ref().take(8).collect();
-        let count = header
-            .get(5..8)
-            .and_then(|digits| str::from_utf8(digits).ok());
+        let count = header.get(5..8).and_then(|digits| str::from_utf8(digits).ok());
         let Some(n_pairs) = count.and_then(|digits| digits.trim().parse::<usize>().ok()) else {
             return glyphs;
         };
@@ -138,9 +136,8 @@ fn parse(file: &str) -> Vec<Glyph> {
 fn glyph(letters: &[u8]) -> Glyph {
     let offset = |letter: u8| f64::from(letter) - f64::from(b'R');
     let mut pairs = letters.chunks_exact(2);
-    let (left, right) = pairs
-        .next()
-        .map_or((0.0, 0.0), |edges| (offset(edges[0]), offset(edges[1])));
+    let (left, right) =
+        pairs.next().map_or((0.0, 0.0), |edges| (offset(edges[0]), offset(edges[1])));
     let mut path = BezPath::new();
     let mut pen_down = false;
     for pair in pairs {
@@ -159,10 +156,7 @@ fn glyph(letters: &[u8]) -> Glyph {
         }
         pen_down = true;
     }
-    Glyph {
-        path,
-        advance_em: (right - left) / UNITS_PER_EM,
-    }
+    Glyph { path, advance_em: (right - left) / UNITS_PER_EM }
 }
 
 #[cfg(test)]

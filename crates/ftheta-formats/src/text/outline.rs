@@ -46,9 +46,7 @@ impl Typeface {
     /// * `weight`: from 600 on it is the bold one
     pub fn bundled(weight: u16) -> &'static Self {
         let typeface = if weight < 600 { &REGULAR } else { &BOLD };
-        typeface
-            .as_ref()
-            .expect("the bundled font was read by the tests")
+        typeface.as_ref().expect("the bundled font was read by the tests")
     }
 
     /// Sets a line of text.
@@ -68,11 +66,7 @@ impl Typeface {
         let metrics = font.glyph_metrics(Size::unscaled(), LocationRef::default());
         for (text_index, character) in text.char_indices() {
             // Fonts without a no-break space still have the other one.
-            let plain = if character.is_whitespace() {
-                ' '
-            } else {
-                character
-            };
+            let plain = if character.is_whitespace() { ' ' } else { character };
             let Some(glyph) = glyphs.map(character).or_else(|| glyphs.map(plain)) else {
                 lettering.missing.push(character);
                 continue;

@@ -105,23 +105,14 @@ fn encodings() {
     let with_mark = |little_endian: bool| -> Vec<u8> {
         let units = std::iter::once(0xfeff).chain(drawing.encode_utf16());
         units
-            .flat_map(|unit| {
-                if little_endian {
-                    unit.to_le_bytes()
-                } else {
-                    unit.to_be_bytes()
-                }
-            })
+            .flat_map(|unit| if little_endian { unit.to_le_bytes() } else { unit.to_be_bytes() })
             .collect()
     };
     let good = outcome(drawing.as_bytes());
     assert_eq!(outcome(&with_mark(true)), good);
     assert_eq!(outcome(&with_mark(false)), good);
     assert_eq!(outcome(format!("\u{feff}{drawing}").as_bytes()), good);
-    let latin1 = [
-        b"<?xml version='1.0' encoding='ISO-8859-1'?><!-- \xe9 -->",
-        drawing.as_bytes(),
-    ];
+    let latin1 = [b"<?xml version='1.0' encoding='ISO-8859-1'?><!-- \xe9 -->", drawing.as_bytes()];
     assert_eq!(outcome(&latin1.concat()), good);
     let mut gzip = GzEncoder::new(Vec::new(), Compression::fast());
     gzip.write_all(drawing.as_bytes()).unwrap();
@@ -246,19 +237,12 @@ fn pages_without_size() {
         "width='1e400' height='1'",
     ] {
         let drawing = format!("<svg {size}>{LINE}</svg>");
-        let error = read(
-            drawing.as_bytes(),
-            &Recipe::default(),
-            &SvgOptions::default(),
-        );
+        let error = read(drawing.as_bytes(), &Recipe::default(), &SvgOptions::default());
         let message = error.unwrap_err().to_string();
         assert!(message.contains("gives no page"), "{size}: {message}");
     }
     for fit_mm in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let options = SvgOptions {
-            fit_mm: Some(fit_mm),
-            ..SvgOptions::default()
-        };
+        let options = SvgOptions { fit_mm: Some(fit_mm), ..SvgOptions::default() };
         let drawing = format!("{HEAD}{LINE}</svg>");
         let error = read(drawing.as_bytes(), &Recipe::default(), &options).unwrap_err();
         assert!(error.to_string().contains("cannot fit"), "{error}");

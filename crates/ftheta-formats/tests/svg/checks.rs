@@ -10,12 +10,7 @@ use std::fmt::Write;
 
 /// Checks the job of a drawing, read as it is.
 pub fn check(drawing: &str, expected: Expect) {
-    check_with(
-        drawing,
-        &Recipe::default(),
-        &SvgOptions::default(),
-        expected,
-    );
+    check_with(drawing, &Recipe::default(), &SvgOptions::default(), expected);
 }
 
 /// Checks the job of a drawing, or the error.
@@ -90,19 +85,11 @@ pub fn path_text(path: &BezPath) -> String {
 pub fn mm(value: f64) -> String {
     let text = format!("{value:.9}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".into()
-    } else {
-        text.into()
-    }
+    if text == "-0" { "0".into() } else { text.into() }
 }
 
 /// The job of a drawing that is good.
 pub fn job_of(drawing: &str) -> Job {
-    let imported = read(
-        drawing.as_bytes(),
-        &Recipe::default(),
-        &SvgOptions::default(),
-    );
+    let imported = read(drawing.as_bytes(), &Recipe::default(), &SvgOptions::default());
     imported.unwrap().value
 }

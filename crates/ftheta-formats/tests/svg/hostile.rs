@@ -14,25 +14,16 @@ fn large_files_stop_at_the_limit() {
     gzip.write_all(&vec![b' '; 1 << 20]).unwrap();
     let bomb = gzip.finish().unwrap();
     let options = SvgOptions {
-        limits: Limits {
-            n_bytes_max: 1 << 16,
-            ..Limits::default()
-        },
+        limits: Limits { n_bytes_max: 1 << 16, ..Limits::default() },
         ..SvgOptions::default()
     };
     let error = read(&bomb, &Recipe::default(), &options).unwrap_err();
     expect!["the file has more than 65536 bytes"].assert_eq(&error.to_string());
     let options = SvgOptions {
-        limits: Limits {
-            n_path_elements_max: 1000,
-            ..Limits::default()
-        },
+        limits: Limits { n_path_elements_max: 1000, ..Limits::default() },
         ..SvgOptions::default()
     };
-    let long = format!(
-        "{HEAD}<path id='p' stroke='red' d='M0 0{}'/></svg>",
-        "h1v1".repeat(1000)
-    );
+    let long = format!("{HEAD}<path id='p' stroke='red' d='M0 0{}'/></svg>", "h1v1".repeat(1000));
     let error = read(long.as_bytes(), &Recipe::default(), &options).unwrap_err();
     expect!["#p: more than 1000 path elements"].assert_eq(&error.to_string());
 }
@@ -60,11 +51,7 @@ fn deep_nesting() {
         ("line 1", "", "256 levels")
     "#]],
     );
-    let spans = format!(
-        "<text>{}x{}</text>",
-        "<tspan>".repeat(250),
-        "</tspan>".repeat(250)
-    );
+    let spans = format!("<text>{}x{}</text>", "<tspan>".repeat(250), "</tspan>".repeat(250));
     check_content(
         &spans,
         expect![[r##"
@@ -115,10 +102,7 @@ fn repeated_content() {
 fn entities() {
     let mut entities = String::from("<!ENTITY e0 'lol'>");
     for level in 1..12 {
-        entities += &format!(
-            "<!ENTITY e{level} '{}'>",
-            format!("&e{};", level - 1).repeat(10)
-        );
+        entities += &format!("<!ENTITY e{level} '{}'>", format!("&e{};", level - 1).repeat(10));
     }
     check(
         format!("<!DOCTYPE svg [{entities}]>{HEAD}<text>&e11;</text></svg>"),
@@ -146,10 +130,7 @@ fn entities() {
     let illustrator = "<!DOCTYPE svg PUBLIC '-//W3C//DTD SVG 1.1//EN' 'svg11.dtd' [\
                        <!ENTITY ns 'http://www.w3.org/2000/svg'>]>";
     check(
-        format!(
-            "{illustrator}{}{LINE}</svg>",
-            HEAD.replace("http://www.w3.org/2000/svg", "&ns;")
-        ),
+        format!("{illustrator}{}{LINE}</svg>", HEAD.replace("http://www.w3.org/2000/svg", "&ns;")),
         expect![[r##"
             ["#ok"]
         "##]],
@@ -166,11 +147,7 @@ fn too_much_markup_on_one_element() {
         ("line 1", "", "256 attributes on one element")
     "#]],
     );
-    let css = format!(
-        "<style>{}{{{}}}</style>",
-        "a,".repeat(9000),
-        "b:c;".repeat(9000)
-    );
+    let css = format!("<style>{}{{{}}}</style>", "a,".repeat(9000), "b:c;".repeat(9000));
     check_content(
         &css,
         expect![[r##"
@@ -193,12 +170,7 @@ fn too_much_markup_on_one_element() {
 fn warnings_are_capped() {
     let images: String = (0..1000).map(|n| format!("<image id='i{n}'/>")).collect();
     let drawing = format!("{HEAD}{LINE}{images}</svg>");
-    let imported = read(
-        drawing.as_bytes(),
-        &Recipe::default(),
-        &SvgOptions::default(),
-    )
-    .unwrap();
+    let imported = read(drawing.as_bytes(), &Recipe::default(), &SvgOptions::default()).unwrap();
     assert_eq!(imported.warnings.len(), 201);
     expect!["<svg>: and 800 more warnings"].assert_eq(&imported.warnings[200].to_string());
 }

@@ -39,12 +39,7 @@ fn units() {
         );
         let job = job_of(&drawing);
         let bounds = job.layers[0].shapes[0].path.bounding_box();
-        for value in [
-            job.page_mm[0],
-            job.page_mm[1],
-            bounds.width(),
-            bounds.height(),
-        ] {
+        for value in [job.page_mm[0], job.page_mm[1], bounds.width(), bounds.height()] {
             assert!((value - side_mm).abs() < 1e-12, "{size}: {value}");
         }
         assert!(bounds.center().distance(Point::ORIGIN) < 1e-12);
@@ -72,10 +67,7 @@ fn page_from_view_box_or_content() {
             warning: <svg>: states no size, so its content in px is taken as the page
         "#]],
     );
-    let options = SvgOptions {
-        fit_mm: Some(30.0),
-        ..SvgOptions::default()
-    };
+    let options = SvgOptions { fit_mm: Some(30.0), ..SvgOptions::default() };
     check_with(
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="100%" height="100%" viewBox="0 0 7 14">
             <path id="p" d="M0 0L7 14" stroke="#000"/></svg>"##,
@@ -104,10 +96,6 @@ fn aspect_ratio() {
             _ => "M-10,5 L10,-5",
         };
         let job = job_of(&drawing);
-        assert_eq!(
-            path_text(&job.layers[0].shapes[0].path),
-            expected,
-            "{aspect}"
-        );
+        assert_eq!(path_text(&job.layers[0].shapes[0].path), expected, "{aspect}");
     }
 }

@@ -67,22 +67,14 @@ fn round_shapes_are_round() {
 
 #[test]
 fn arcs_take_the_asked_way() {
-    for (flags, large, below) in [
-        ("0 0", false, true),
-        ("0 1", false, false),
-        ("1 0", true, true),
-        ("1 1", true, false),
-    ] {
-        let drawing = on_page(&format!(
-            "<path d='M-1 0A2 2 0 {flags} 1 0' fill='none' stroke='red'/>"
-        ));
+    for (flags, large, below) in
+        [("0 0", false, true), ("0 1", false, false), ("1 0", true, true), ("1 1", true, false)]
+    {
+        let drawing =
+            on_page(&format!("<path d='M-1 0A2 2 0 {flags} 1 0' fill='none' stroke='red'/>"));
         let job = job_of(&drawing);
         let bounds = job.layers[0].shapes[0].path.bounding_box();
-        let sagitta_mm = if large {
-            2.0 + 3f64.sqrt()
-        } else {
-            2.0 - 3f64.sqrt()
-        };
+        let sagitta_mm = if large { 2.0 + 3f64.sqrt() } else { 2.0 - 3f64.sqrt() };
         let found_mm = if below { -bounds.y0 } else { bounds.y1 };
         assert!((found_mm - sagitta_mm).abs() < 1e-6, "{flags}: {bounds:?}");
     }

@@ -85,10 +85,7 @@ fn paint_servers() {
 
 #[test]
 fn pens_by_colour_and_layer() {
-    let pen = |name: &str| Pen {
-        name: name.into(),
-        ..Pen::default()
-    };
+    let pen = |name: &str| Pen { name: name.into(), ..Pen::default() };
     let rule = |name: &str, color_rgb: Option<[u8; 3]>, layer: Option<&str>| PenRule {
         pen: pen(name),
         color_rgb,
@@ -127,9 +124,7 @@ fn pens_by_colour_and_layer() {
           stroke #0000ff #f: M0,0 L1,0
     "#]],
     );
-    let job = read(drawing.as_bytes(), &recipe, &SvgOptions::default())
-        .unwrap()
-        .value;
+    let job = read(drawing.as_bytes(), &recipe, &SvgOptions::default()).unwrap().value;
     let names: Vec<_> = job.pens.iter().map(|pen| pen.name.as_str()).collect();
     let expected = ["red on deep", "deep", "unused", "red", "#0000ff", "#00ff00"];
     assert_eq!(names, expected);

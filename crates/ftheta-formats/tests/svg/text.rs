@@ -13,10 +13,7 @@ fn imported(content: &str, style: TextStyle) -> Imported<Job> {
         "<svg xmlns='http://www.w3.org/2000/svg' width='20mm' height='20mm' \
          viewBox='-10 -10 20 20'>{content}</svg>"
     );
-    let recipe = Recipe {
-        text: style,
-        ..Recipe::default()
-    };
+    let recipe = Recipe { text: style, ..Recipe::default() };
     read(drawing.as_bytes(), &recipe, &SvgOptions::default()).unwrap()
 }
 
@@ -31,11 +28,7 @@ fn check(content: &str, style: TextStyle, expected: Expect) {
     let imported = imported(content, style);
     let mut out = String::new();
     for shape in imported.value.shapes() {
-        let paint = if shape.paint == Paint::Stroke {
-            "stroke"
-        } else {
-            "fill"
-        };
+        let paint = if shape.paint == Paint::Stroke { "stroke" } else { "fill" };
         let pen = &imported.value.pens[shape.pen_index].name;
         writeln!(out, "{paint} {pen} {}", shape.source).unwrap();
         for subpath in shape.path.subpaths() {
@@ -129,10 +122,7 @@ fn anchors() {
 fn white_space() {
     let plain = bounds("<text font-size='4'>a b</text>");
     assert_eq!(bounds("<text font-size='4'>\n  a \t\n b  </text>"), plain);
-    assert_eq!(
-        bounds("<text font-size='4'> a <tspan> b </tspan> </text>"),
-        plain
-    );
+    assert_eq!(bounds("<text font-size='4'> a <tspan> b </tspan> </text>"), plain);
     assert!(plain.x1 < bounds("<text font-size='4' xml:space='preserve'>a  b</text>").x1);
     assert!(plain.x1 < bounds("<text font-size='4' letter-spacing='1'>a b</text>").x1);
 }

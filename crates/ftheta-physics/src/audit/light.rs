@@ -23,19 +23,12 @@ pub fn check_light(draft: &PlanDraft) -> Result<(), AuditError> {
         let place = || format!("mark {index} ({})", mark.source);
         if !(0.0 <= mark.power_w && mark.power_w <= machine.laser.power_max_w) {
             let (value_w, limit_w) = (mark.power_w, machine.laser.power_max_w);
-            return Err(AuditError::Power {
-                place: place(),
-                value_w,
-                limit_w,
-            });
+            return Err(AuditError::Power { place: place(), value_w, limit_w });
         }
         let ordered = last_off_ns <= mark.on_ns && mark.on_ns <= mark.off_ns;
         if !ordered || mark.off_ns >= end_ns {
             let what = "its laser edges overlap another mark's, or the plan's end".into();
-            return Err(AuditError::Malformed {
-                place: place(),
-                what,
-            });
+            return Err(AuditError::Malformed { place: place(), what });
         }
         last_off_ns = mark.off_ns;
         let on_ns = mark.on_ns as i64 + machine.laser.on_latency_ns - lag_ns;
@@ -48,12 +41,7 @@ pub fn check_light(draft: &PlanDraft) -> Result<(), AuditError> {
         ] {
             if early_ns > slack_ns {
                 let (value_us, limit_us) = (early_ns as f64 * 1e-3, slack_ns as f64 * 1e-3);
-                return Err(AuditError::Light {
-                    place: place(),
-                    edge,
-                    value_us,
-                    limit_us,
-                });
+                return Err(AuditError::Light { place: place(), edge, value_us, limit_us });
             }
         }
     }

@@ -19,13 +19,7 @@ pub struct Walk<'a> {
 impl<'a> Walk<'a> {
     /// Starts at the first sample.
     pub fn new(draft: &'a PlanDraft) -> Self {
-        let mut walk = Self {
-            draft,
-            segment_index: 0,
-            n_given: 0,
-            leg: 0,
-            leg_start_mm: 0.0,
-        };
+        let mut walk = Self { draft, segment_index: 0, n_given: 0, leg: 0, leg_start_mm: 0.0 };
         walk.enter();
         walk
     }
@@ -53,13 +47,7 @@ impl<'a> Walk<'a> {
 
     fn place(&mut self, motion: &Motion, last: bool) -> Point {
         let vertices = &self.draft.vertices;
-        let &Motion::Travel {
-            first_vertex,
-            n_vertices,
-            profile,
-            ..
-        } = motion
-        else {
+        let &Motion::Travel { first_vertex, n_vertices, profile, .. } = motion else {
             return vertices[self.leg];
         };
         let end = (first_vertex + n_vertices) as usize - 1;
@@ -91,34 +79,22 @@ fn first_vertex(motion: &Motion) -> usize {
 fn last_vertex(motion: &Motion) -> usize {
     match *motion {
         Motion::Hold { vertex } => vertex as usize,
-        Motion::Travel {
-            first_vertex,
-            n_vertices,
-            ..
-        } => first_vertex as usize + n_vertices as usize - 1,
+        Motion::Travel { first_vertex, n_vertices, .. } => {
+            first_vertex as usize + n_vertices as usize - 1
+        }
     }
 }
 
 /// Checks that indices exist, numbers are finite and segments join end to end from the centre.
 pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
-    let malformed = |place: String, what: &str| AuditError::Malformed {
-        place,
-        what: what.into(),
-    };
+    let malformed = |place: String, what: &str| AuditError::Malformed { place, what: what.into() };
     if draft.segments.is_empty() {
         return Err(malformed("the plan".into(), "no segments"));
     }
     if let Some(index) = draft.vertices.iter().position(|vertex| !vertex.is_finite()) {
-        return Err(malformed(
-            format!("vertex {index}"),
-            "a coordinate is not finite",
-        ));
+        return Err(malformed(format!("vertex {index}"), "a coordinate is not finite"));
     }
-    if let Some(index) = draft
-        .marks
-        .iter()
-        .position(|mark| mark.pen_index >= draft.pens.len())
-    {
+    if let Some(index) = draft.marks.iter().position(|mark| mark.pen_index >= draft.pens.len()) {
         return Err(malformed(format!("mark {index}"), "its pen does not exist"));
     }
     let mut at = Point::ZERO;
@@ -127,18 +103,10 @@ pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
         if segment.n_ticks == 0 {
             return Err(malformed(place(), "no samples"));
         }
-        if segment
-            .mark_index
-            .is_some_and(|mark| mark as usize >= draft.marks.len())
-        {
+        if segment.mark_index.is_some_and(|mark| mark as usize >= draft.marks.len()) {
             return Err(malformed(place(), "its mark does not exist"));
         }
-        if let Motion::Travel {
-            n_vertices,
-            profile,
-            ..
-        } = segment.motion
-        {
+        if let Motion::Travel { n_vertices, profile, .. } = segment.motion {
             let positive = |value: f64| value > 0.0;
             if n_vertices < 2
                 || !(profile.length_mm.is_finite() && profile.speed_mm_s.is_finite())
@@ -152,10 +120,7 @@ pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
             return Err(malformed(place(), "its vertices do not exist"));
         }
         if draft.vertices[first_vertex(&segment.motion)] != at {
-            return Err(malformed(
-                place(),
-                "it does not start where the one before ends",
-            ));
+            return Err(malformed(place(), "it does not start where the one before ends"));
         }
         at = draft.vertices[last_vertex(&segment.motion)];
     }

@@ -104,28 +104,10 @@ impl Settings {
         let fastest_mm_s = machine.scanner.speed_max_rad_s * scale_mm_per_rad(&machine.optics);
         let nanosecond = 1e-9;
         let rows = [
-            (
-                "jump_speed",
-                self.jump_speed_mm_s,
-                1e-3,
-                fastest_mm_s,
-                "mm/s",
-            ),
-            (
-                "jump_delay_min",
-                self.jump_delay_min_s,
-                0.0,
-                DELAY_MAX_S,
-                "s",
-            ),
+            ("jump_speed", self.jump_speed_mm_s, 1e-3, fastest_mm_s, "mm/s"),
+            ("jump_delay_min", self.jump_delay_min_s, 0.0, DELAY_MAX_S, "s"),
             ("jump_delay", self.jump_delay_s, 0.0, DELAY_MAX_S, "s"),
-            (
-                "jump_length_limit",
-                self.jump_length_limit_mm,
-                1e-6,
-                1e6,
-                "mm",
-            ),
+            ("jump_length_limit", self.jump_length_limit_mm, 1e-6, 1e6, "mm"),
             ("mark_delay", self.mark_delay_s, 0.0, DELAY_MAX_S, "s"),
             ("polygon_delay", self.polygon_delay_s, 0.0, DELAY_MAX_S, "s"),
             (
@@ -142,20 +124,8 @@ impl Settings {
                 DELAY_MAX_S,
                 "s",
             ),
-            (
-                "acceleration",
-                self.acceleration_mm_s2,
-                1.0,
-                f64::INFINITY,
-                "mm/s²",
-            ),
-            (
-                "deceleration",
-                self.deceleration_mm_s2,
-                1.0,
-                f64::INFINITY,
-                "mm/s²",
-            ),
+            ("acceleration", self.acceleration_mm_s2, 1.0, f64::INFINITY, "mm/s²"),
+            ("deceleration", self.deceleration_mm_s2, 1.0, f64::INFINITY, "mm/s²"),
         ];
         for (quantity, value, low, high, unit) in rows {
             check_range("recipe [classic]", quantity, value, (low, high), unit)?;
@@ -168,20 +138,8 @@ impl Settings {
 pub(super) fn check_pen(pen: &Pen, machine: &Machine) -> Result<(), PlanError> {
     let place = format!("pen \"{}\"", pen.name);
     let fastest_mm_s = machine.scanner.speed_max_rad_s * scale_mm_per_rad(&machine.optics);
-    check_range(
-        &place,
-        "mark_speed",
-        pen.mark_speed_mm_s,
-        (1e-3, fastest_mm_s),
-        "mm/s",
-    )?;
-    check_range(
-        &place,
-        "power",
-        pen.power_w,
-        (0.0, machine.laser.power_max_w),
-        "W",
-    )
+    check_range(&place, "mark_speed", pen.mark_speed_mm_s, (1e-3, fastest_mm_s), "mm/s")?;
+    check_range(&place, "power", pen.power_w, (0.0, machine.laser.power_max_w), "W")
 }
 
 fn check_range(
@@ -194,12 +152,5 @@ fn check_range(
     if low <= value && value <= high {
         return Ok(());
     }
-    Err(PlanError::Setting {
-        place: place.into(),
-        quantity,
-        value,
-        low,
-        high,
-        unit,
-    })
+    Err(PlanError::Setting { place: place.into(), quantity, value, low, high, unit })
 }
