@@ -24,6 +24,8 @@ pub enum Command {
     Mark(Box<Mark>),
     /// Audit a plan file again: its id, its limits, its light.
     Verify(Verify),
+    /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv).
+    Convert(Convert),
     /// List, show and check machines.
     Machine(Machine),
     /// Print the completion script for a shell.
@@ -93,6 +95,21 @@ pub struct Mark {
 pub struct Verify {
     /// Plan file, as `ftheta mark` writes it.
     pub plan: PathBuf,
+}
+
+#[derive(Args)]
+#[command(after_help = "Example: ftheta convert logo.svg logo-curves.svg --fit 80")]
+pub struct Convert {
+    /// Drawing: .svg or .svgz.
+    pub input: PathBuf,
+    /// File to write: .svg or .csv.
+    pub output: PathBuf,
+    /// Recipe file: text style, pens, hatch.
+    #[arg(long, value_name = "FILE")]
+    pub recipe: Option<PathBuf>,
+    /// Scale the page so that its longest side is this long, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub fit: Option<f64>,
 }
 
 #[derive(Args)]

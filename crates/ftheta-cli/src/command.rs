@@ -1,5 +1,6 @@
 //! The commands: each reads its arguments, calls the library, prints.
 
+pub mod convert;
 pub mod machine;
 pub mod mark;
 pub mod verify;

@@ -4,5 +4,6 @@ pub mod machine;
 pub mod plan_file;
 pub mod recipe;
 pub mod svg;
+pub mod svg_write;
 pub mod text;
 pub mod toml_table;

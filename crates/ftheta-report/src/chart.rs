@@ -34,93 +34,97 @@ pub struct Chart<'a> {
     pub limit: Option<f64>,
 }
 
+/// From values to places in the picture.
+struct Scale {
+    x: (f64, f64),
+    y: (f64, f64),
+    bottom: f64,
+}
+
+impl Scale {
+    fn px(&self, x: f64) -> f64 {
+        LEFT + (WIDTH - LEFT - RIGHT) * (x - self.x.0) / (self.x.1 - self.x.0)
+    }
+
+    fn py(&self, y: f64) -> f64 {
+        TOP + (self.bottom - TOP) * (self.y.1 - y) / (self.y.1 - self.y.0)
+    }
+}
+
 impl Chart<'_> {
     /// The chart as an `svg` element.
     pub fn svg(&self) -> String {
         let foot = if self.x_label.is_empty() { 8.0 } else { 40.0 };
-        let height = 118.0 + foot;
-        let (x0, x1) = self.x_range;
-        let (y0, y1) = self.y_range();
-        let inner = (WIDTH - LEFT - RIGHT, height - TOP - foot);
-        let px = |x: f64| LEFT + inner.0 * (x - x0) / (x1 - x0);
-        let py = |y: f64| TOP + inner.1 * (y1 - y) / (y1 - y0);
-        let mut out = String::new();
-        put(
-            &mut out,
-            format_args!("<svg class=chart viewBox='0 0 {WIDTH} {height}' role=img>"),
-        );
-        let (bottom, right) = (height - foot, WIDTH - RIGHT);
-        let y_step = tick_step(y1 - y0, 4.0);
-        for y in ticks(y0, y1, y_step) {
-            let at = py(y);
-            put(
-                &mut out,
-                format_args!("<path class=grid d='M{LEFT} {at:.1}H{right}'/>"),
-            );
-            let (x, y_text, label) = (LEFT - 7.0, at + 4.0, tick(y, y_step));
-            put(
-                &mut out,
-                format_args!("<text x='{x}' y='{y_text:.1}' text-anchor=end>{label}</text>"),
-            );
-        }
-        let x_step = tick_step(x1 - x0, 10.0);
-        for x in ticks(x0, x1, x_step) {
-            let at = px(x);
-            put(
-                &mut out,
-                format_args!("<path class=grid d='M{at:.1} {TOP}V{bottom}'/>"),
-            );
-            if !self.x_label.is_empty() {
-                let (y, label) = (bottom + 16.0, tick(x, x_step));
-                put(
-                    &mut out,
-                    format_args!("<text x='{at:.1}' y='{y}' text-anchor=middle>{label}</text>"),
-                );
-            }
-        }
-        let limits = self.limit.into_iter().flat_map(|limit| [-limit, limit]);
-        for limit in limits.filter(|limit| y0 <= *limit && *limit <= y1) {
-            let at = py(limit);
-            put(
-                &mut out,
-                format_args!("<path class=limit d='M{LEFT} {at:.1}H{right}'/>"),
-            );
-        }
+        let scale = Scale { x: self.x_range, y: self.y_range(), bottom: 118.0 };
+        let mut out =
+            format!("<svg class=chart viewBox='0 0 {WIDTH} {}' role=img>", scale.bottom + foot);
+        self.draw_grid(&mut out, &scale);
         for series in self.series {
-            put(
-                &mut out,
-                format_args!("<path class=line stroke='{}' d='", series.color),
-            );
+            put(&mut out, format_args!("<path class=line stroke='{}' d='", series.color));
             for (i, (x, y)) in thinned(&series.points).into_iter().enumerate() {
                 let letter = if i == 0 { 'M' } else { 'L' };
-                put(
-                    &mut out,
-                    format_args!("{letter}{:.1} {:.1}", px(x), py(y.clamp(y0, y1))),
-                );
+                put(&mut out, format_args!("{letter}{:.1} {:.1}", scale.px(x), scale.py(y)));
             }
             out.push_str("'/>");
         }
-        let (mid_x, mid_y) = (LEFT + 0.5 * inner.0, TOP + 0.5 * inner.1);
+        let bottom = scale.bottom;
+        let (mid_x, mid_y) = (0.5 * (LEFT + WIDTH - RIGHT), 0.5 * (TOP + bottom));
         let (x_label, y_label) = (escaped(self.x_label), escaped(self.y_label));
         put(
             &mut out,
             format_args!(
-                "<path class=axis d='M{LEFT} {TOP}V{bottom}H{right}'/>\
+                "<path class=axis d='M{LEFT} {TOP}V{bottom}H{}'/>\
                  <text class=label transform='translate(13 {mid_y}) rotate(-90)' \
                  text-anchor=middle>{y_label}</text>\
                  <text class=label x='{mid_x}' y='{}' text-anchor=middle>{x_label}</text></svg>",
+                WIDTH - RIGHT,
                 bottom + 34.0
             ),
         );
         out
     }
 
+    fn draw_grid(&self, out: &mut String, scale: &Scale) {
+        let (bottom, right) = (scale.bottom, WIDTH - RIGHT);
+        let (y0, y1) = scale.y;
+        let y_step = tick_step(y1 - y0, 5.0);
+        for y in ticks(y0, y1, y_step) {
+            let (at, label) = (scale.py(y), tick(y, y_step));
+            put(
+                out,
+                format_args!(
+                    "<path class=grid d='M{LEFT} {at:.1}H{right}'/>\
+                     <text x='{}' y='{:.1}' text-anchor=end>{label}</text>",
+                    LEFT - 7.0,
+                    at + 4.0
+                ),
+            );
+        }
+        let (x0, x1) = scale.x;
+        let x_step = tick_step(x1 - x0, 10.0);
+        for x in ticks(x0, x1, x_step) {
+            let at = scale.px(x);
+            put(out, format_args!("<path class=grid d='M{at:.1} {TOP}V{bottom}'/>"));
+            if !self.x_label.is_empty() {
+                let (y, label) = (bottom + 16.0, tick(x, x_step));
+                put(
+                    out,
+                    format_args!("<text x='{at:.1}' y='{y}' text-anchor=middle>{label}</text>"),
+                );
+            }
+        }
+        let limits = self.limit.into_iter().flat_map(|limit| [-limit, limit]);
+        for limit in limits.filter(|limit| y0 <= *limit && *limit <= y1) {
+            let at = scale.py(limit);
+            put(out, format_args!("<path class=limit d='M{LEFT} {at:.1}H{right}'/>"));
+        }
+    }
+
     /// Symmetric about zero where the lines are on both sides, with a little room.
     fn y_range(&self) -> (f64, f64) {
         let values = self.series.iter().flat_map(|series| &series.points);
-        let (mut lo, mut hi) = values.fold((0.0f64, 0.0f64), |(lo, hi), point| {
-            (lo.min(point.1), hi.max(point.1))
-        });
+        let (mut lo, mut hi) =
+            values.fold((0.0f64, 0.0f64), |(lo, hi), point| (lo.min(point.1), hi.max(point.1)));
         if let Some(limit) = self.limit {
             let near = lo.abs().max(hi) > 0.6 * limit;
             if near {

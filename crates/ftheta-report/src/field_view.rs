@@ -14,13 +14,10 @@ const LEFT: f64 = 44.0;
 const BOTTOM: f64 = 38.0;
 const ROOM: f64 = 8.0;
 /// Colours of pens, in turn.
-const PEN_COLORS: [&str; 6] = [
-    "#17202a", "#1d6fb8", "#2e8b57", "#b8511d", "#7b4fa3", "#8a6d1f",
-];
+const PEN_COLORS: [&str; 6] = ["#17202a", "#1d6fb8", "#2e8b57", "#b8511d", "#7b4fa3", "#8a6d1f"];
 /// Small to large errors.
-const ERROR_COLORS: [&str; 7] = [
-    "#c3d4e6", "#86b6d9", "#4a98c9", "#3aa888", "#e3b23c", "#e8772e", "#c81d25",
-];
+const ERROR_COLORS: [&str; 7] =
+    ["#c3d4e6", "#86b6d9", "#4a98c9", "#3aa888", "#e3b23c", "#e8772e", "#c81d25"];
 
 /// A square window of the field with its scale.
 struct Frame {
@@ -50,10 +47,7 @@ impl Frame {
     }
 
     fn place(&self, p: Point) -> (f64, f64) {
-        (
-            LEFT + self.px_per_mm * (p.x - self.left_mm),
-            ROOM + self.px_per_mm * (self.top_mm - p.y),
-        )
+        (LEFT + self.px_per_mm * (p.x - self.left_mm), ROOM + self.px_per_mm * (self.top_mm - p.y))
     }
 
     fn draw_scale(&mut self, longest_mm: f64) {
@@ -133,10 +127,7 @@ pub fn marks_svg(plan: &PlanDraft) -> String {
                 }
             });
         }
-        put(
-            &mut frame.out,
-            format_args!("<path class=mark stroke='{color}' d='{d}'/>"),
-        );
+        put(&mut frame.out, format_args!("<path class=mark stroke='{color}' d='{d}'/>"));
     }
     frame.finish()
 }
@@ -152,10 +143,7 @@ fn draw_jumps(frame: &mut Frame, plan: &PlanDraft) {
         };
         let (a, b) = (frame.place(from), frame.place(to));
         if (a.0 - b.0).hypot(a.1 - b.1) > 1.0 {
-            put(
-                &mut d,
-                format_args!("M{:.1} {:.1}L{:.1} {:.1}", a.0, a.1, b.0, b.1),
-            );
+            put(&mut d, format_args!("M{:.1} {:.1}L{:.1} {:.1}", a.0, a.1, b.0, b.1));
         }
     }
     put(&mut frame.out, format_args!("<path class=jump d='{d}'/>"));
@@ -173,16 +161,10 @@ pub fn errors_svg(plan: &PlanDraft, score: &Score) -> String {
         };
         let class = (sample.error_um / top_um * ERROR_COLORS.len() as f64) as usize;
         let (x, y) = frame.place(Point::new(sample.x_mm, sample.y_mm));
-        put(
-            &mut classes[class.min(ERROR_COLORS.len() - 1)],
-            format_args!("M{x:.1} {y:.1}h0"),
-        );
+        put(&mut classes[class.min(ERROR_COLORS.len() - 1)], format_args!("M{x:.1} {y:.1}h0"));
     }
     for (d, color) in classes.iter().zip(ERROR_COLORS) {
-        put(
-            &mut frame.out,
-            format_args!("<path class=dots stroke='{color}' d='{d}'/>"),
-        );
+        put(&mut frame.out, format_args!("<path class=dots stroke='{color}' d='{d}'/>"));
     }
     if let Some(worst) = score.worst_marks.first() {
         let (x, y) = frame.place(Point::new(worst.x_mm, worst.y_mm));
@@ -205,10 +187,11 @@ pub fn errors_svg(plan: &PlanDraft, score: &Score) -> String {
 pub fn error_legend_svg(score: &Score) -> String {
     let top_um = error_scale_um(score);
     let n = ERROR_COLORS.len() as f64;
-    let width = 420.0 / n;
+    let (left, right) = (LEFT, SIDE - ROOM);
+    let width = (right - left) / n;
     let mut out = String::from("<svg class=legend viewBox='0 0 460 34' role=img>");
     for (i, color) in ERROR_COLORS.iter().enumerate() {
-        let x = 20.0 + width * i as f64;
+        let x = left + width * i as f64;
         let label = number(top_um * i as f64 / n);
         put(
             &mut out,
@@ -219,17 +202,18 @@ pub fn error_legend_svg(score: &Score) -> String {
         );
     }
     let label = number(top_um);
-    put(
-        &mut out,
-        format_args!("<text x='440' y='26' text-anchor=middle>{label} µm</text></svg>"),
-    );
+    put(&mut out, format_args!("<text x='440' y='26' text-anchor=middle>{label} µm</text></svg>"));
     out
 }
 
 /// The upper end of the colour scale: a round number that gives seven round classes.
 fn error_scale_um(score: &Score) -> f64 {
     let n = ERROR_COLORS.len() as f64;
-    n * tick_step(score.contour_error_um.max.max(1e-3), n)
+    let rough = score.contour_error_um.max.max(1e-3) / n;
+    let power = 10f64.powf(rough.log10().floor());
+    let steps = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+    let step = steps.into_iter().find(|step| step * power >= rough);
+    n * power * step.unwrap_or(10.0)
 }
 
 fn worse(a: ErrorSample, b: ErrorSample) -> ErrorSample {
@@ -238,7 +222,5 @@ fn worse(a: ErrorSample, b: ErrorSample) -> ErrorSample {
 
 fn shown_area(plan: &PlanDraft) -> Rect {
     let boxes = plan.marks.iter().map(|mark| mark.curve.bounding_box());
-    boxes
-        .reduce(|a, b| a.union(b))
-        .unwrap_or(Rect::new(-10.0, -10.0, 10.0, 10.0))
+    boxes.reduce(|a, b| a.union(b)).unwrap_or(Rect::new(-10.0, -10.0, 10.0, 10.0))
 }

@@ -1,12 +1,19 @@
 //! What the beam did against what was asked: figures, picture and report.
 
 pub mod plate;
+pub mod report;
 pub mod score;
 
+mod axes_view;
+mod bars;
+mod cards;
+mod chart;
 mod contour;
 mod coverage;
+mod field_view;
 mod histogram;
 mod lettering;
 mod line_dose;
 mod tally;
+mod text;
 mod track;

@@ -45,7 +45,7 @@ pub fn number(value: f64) -> String {
 /// A time with a unit that suits it.
 pub fn time(seconds: f64) -> String {
     match seconds {
-        s if s == 0.0 => "0 s".into(),
+        0.0 => "0 s".into(),
         s if s < 1e-3 => format!("{} µs", number(1e6 * s)),
         s if s < 1.0 => format!("{} ms", number(1e3 * s)),
         s if s < 120.0 => format!("{} s", number(s)),
@@ -64,14 +64,12 @@ pub fn tick(value: f64, step: f64) -> String {
     }
 }
 
-/// The step of 1, 2 or 5 times a power of ten that divides `range` into about `n` parts.
+/// The step of 1, 2 or 5 times a power of ten that divides `range` into `n` parts or a few more.
 pub fn tick_step(range: f64, n: f64) -> f64 {
     let rough = (range / n).max(f64::MIN_POSITIVE);
     let power = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0].map(|step| step * power);
-    step.into_iter()
-        .find(|step| *step >= rough * 0.999)
-        .unwrap_or(10.0 * power)
+    step.into_iter().find(|step| *step >= 0.7 * rough).unwrap_or(10.0 * power)
 }
 
 /// Ticks from `lo` to `hi`, both included where they fall on one.
@@ -85,8 +83,7 @@ pub fn ticks(lo: f64, hi: f64, step: f64) -> impl Iterator<Item = f64> {
 
 /// Appends formatted text; writing to a string cannot fail.
 pub fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
-    out.write_fmt(text)
-        .expect("writing to a string does not fail");
+    out.write_fmt(text).expect("writing to a string does not fail");
 }
 
 #[cfg(test)]

@@ -25,9 +25,11 @@ macro_rules! properties {
 }
 
 properties! {
+    BaselineShift = "baseline-shift",
     ClipPath = "clip-path",
     Color = "color",
     Display = "display",
+    DominantBaseline = "dominant-baseline",
     Fill = "fill",
     FillOpacity = "fill-opacity",
     FillRule = "fill-rule",
@@ -51,9 +53,12 @@ properties! {
     StrokeOpacity = "stroke-opacity",
     StrokeWidth = "stroke-width",
     TextAnchor = "text-anchor",
+    TextDecoration = "text-decoration",
     Transform = "transform",
+    TransformOrigin = "transform-origin",
     Visibility = "visibility",
     WordSpacing = "word-spacing",
+    WritingMode = "writing-mode",
 }
 
 /// The strongest value of each property on one element.
@@ -91,9 +96,12 @@ impl<'a> Declared<'a> {
         self.values[property as usize].filter(|value| *value != "inherit")
     }
 
-    /// Whether a property refers to something: neither absent nor `none`.
-    pub fn refers(&self, property: Property) -> bool {
-        self.get(property).is_some_and(|value| value != "none")
+    /// Whether a property asks for something other than what it is without being stated.
+    pub fn asks(&self, property: Property) -> bool {
+        let nothing = ["none", "auto", "normal", "baseline", "alphabetic", "0", "0%"];
+        let horizontal = ["lr", "lr-tb", "horizontal-tb"];
+        self.get(property)
+            .is_some_and(|value| !nothing.contains(&value) && !horizontal.contains(&value))
     }
 
     /// What was stated but has no meaning.

@@ -11,6 +11,8 @@ use kurbo::{BezPath, PathEl, Point};
 
 /// Coordinates beyond this are taken for a mistake, mm.
 const COORDINATE_MAX_MM: f64 = 1e6;
+/// Strokes wider than this are told of: only their centre line is marked, mm.
+const WIDE_MM: f64 = 0.5;
 
 /// Marks the curves of a shape element.
 ///
@@ -62,12 +64,18 @@ pub fn mark<'a>(
     };
     if let Some(color_rgb) = fill {
         visible = true;
+        reader.tally.n_white_areas += usize::from(color_rgb == [255; 3]);
         let paint = (Paint::Fill(style.fill_rule), color_rgb);
         add(reader, node, path.clone(), paint, context)?;
     }
     if let Some(color_rgb) = color_of(reader, node, style.visible_stroke(), context) {
         visible = true;
         let line = with_dashes(reader, node, path, context);
+        let width_mm = style.stroke_width * context.mm_per_unit();
+        if WIDE_MM < width_mm {
+            reader.tally.n_wide_strokes += 1;
+            reader.tally.widest_stroke_mm = reader.tally.widest_stroke_mm.max(width_mm);
+        }
         add(reader, node, line, (Paint::Stroke, color_rgb), context)?;
     }
     if !visible {
@@ -108,7 +116,8 @@ fn with_dashes<'a>(
     context: &Context<'a>,
 ) -> BezPath {
     let style = &context.style;
-    if style.dashes.is_empty() {
+    // What is out of reach is left out later on; its length cannot be measured.
+    if style.dashes.is_empty() || !within_reach(&(context.field_from_user * path.clone())) {
         return path.clone();
     }
     let cut = dashed(path, &style.dashes, style.dash_offset, context.mm_per_unit());
@@ -128,9 +137,7 @@ fn add<'a>(
 ) -> Result<(), SvgError> {
     path.apply_affine(context.field_from_user);
     let bounds = path.control_box();
-    let within = |value: f64| value.abs() <= COORDINATE_MAX_MM;
-    let inside = [bounds.x0, bounds.y0, bounds.x1, bounds.y1].into_iter().all(within);
-    let fault = if path.is_empty() || !path.is_finite() || !inside {
+    let fault = if path.is_empty() || !within_reach(&path) {
         Some("coordinates beyond 1 km or not finite, left out")
     } else if bounds.width() == 0.0 && bounds.height() == 0.0 {
         Some("a single point without length, left out")
@@ -150,6 +157,13 @@ fn add<'a>(
     let shape = Shape { source: reader.drawing.place(node), path, paint, pen_index };
     reader.marking.add(context.scope, shape);
     Ok(())
+}
+
+/// Whether all points of a path in field mm are finite and at places that make sense.
+fn within_reach(path: &BezPath) -> bool {
+    let bounds = path.control_box();
+    let corners = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];
+    path.is_finite() && corners.into_iter().all(|value| value.abs() <= COORDINATE_MAX_MM)
 }
 
 /// Whether any subpath can have an inside. A plain line has none, though SVG fills it by default:

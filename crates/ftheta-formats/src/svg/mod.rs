@@ -120,6 +120,9 @@ pub fn read(
         }
     };
     reader.read(&page)?;
+    for surprise in reader.tally.surprises() {
+        reader.warnings.add("<svg>", surprise);
+    }
     if reader.marking.is_empty() {
         return Err(SvgError::NothingToMark { reason: reader.tally.reason() });
     }

@@ -56,6 +56,8 @@ pub struct Style<'a> {
     pub dashes: Rc<[f64]>,
     /// Where in the dashes a line starts.
     pub dash_offset: f64,
+    /// Width of lines, 0 if not stated; they are marked along their centre whatever it is.
+    pub stroke_width: f64,
     /// `visibility` is `visible`.
     pub visible: bool,
     /// Names of fonts, best first.
@@ -85,6 +87,8 @@ impl Default for Style<'_> {
             stroke_opacity: 1.0,
             dashes: Rc::from([]),
             dash_offset: 0.0,
+            // Not the 1 that SVG has: a width that nobody chose is nothing to tell of.
+            stroke_width: 0.0,
             visible: true,
             font_family: "",
             font_size: 16.0,
@@ -130,6 +134,9 @@ impl<'a> Style<'a> {
         }
         if let Some(offset) = length_of(declared, Property::StrokeDashoffset, &base) {
             self.dash_offset = offset;
+        }
+        if let Some(width) = length_of(declared, Property::StrokeWidth, &base) {
+            self.stroke_width = width;
         }
     }
 

@@ -11,6 +11,12 @@ pub struct Tally {
     pub n_dropped: usize,
     /// Elements that are hidden or have no paint.
     pub n_invisible: usize,
+    /// Strokes that look like areas.
+    pub n_wide_strokes: usize,
+    /// The widest of them, mm.
+    pub widest_stroke_mm: f64,
+    /// Areas in the colour of paper.
+    pub n_white_areas: usize,
     n_images: usize,
     n_foreign: usize,
 }
@@ -23,6 +29,25 @@ impl Tally {
         } else {
             self.n_foreign += 1;
         }
+    }
+
+    /// What may surprise in a job, one sentence each.
+    pub fn surprises(&self) -> Vec<String> {
+        let mut surprises = Vec::new();
+        if self.n_wide_strokes != 0 {
+            surprises.push(format!(
+                "strokes up to {:.3} mm wide are marked along their centre line only ({})",
+                self.widest_stroke_mm, self.n_wide_strokes
+            ));
+        }
+        if self.n_white_areas != 0 {
+            surprises.push(format!(
+                "white areas are marked like any other; give them no fill if they are not meant \
+                 to be ({})",
+                self.n_white_areas
+            ));
+        }
+        surprises
     }
 
     /// Why no shape came out, as far as known.

@@ -77,7 +77,7 @@ fn span<'a>(
     context: &Context<'a>,
     text: &mut Text<'a>,
 ) -> Result<(), SvgError> {
-    let unsupported = ["rotate", "textLength", "lengthAdjust", "dominant-baseline", "writing-mode"];
+    let unsupported = ["rotate", "textLength"];
     let found = unsupported.iter().find(|name| plain_attribute(node, name).is_some());
     if let Some(name) = found {
         let message = format!("{name} is ignored");

@@ -189,8 +189,13 @@ impl<'a, 'r> Reader<'a, 'r> {
             (Property::MarkerStart, "markers are ignored"),
             (Property::MarkerMid, "markers are ignored"),
             (Property::MarkerEnd, "markers are ignored"),
+            (Property::TransformOrigin, "transform-origin is ignored"),
+            (Property::BaselineShift, "baseline-shift is ignored"),
+            (Property::DominantBaseline, "dominant-baseline is ignored"),
+            (Property::TextDecoration, "text-decoration is ignored"),
+            (Property::WritingMode, "writing-mode is ignored"),
         ];
-        if let Some((_, message)) = effects.iter().find(|effect| declared.refers(effect.0)) {
+        if let Some((_, message)) = effects.iter().find(|effect| declared.asks(effect.0)) {
             self.warnings.add(self.drawing.place(node), *message);
         }
     }

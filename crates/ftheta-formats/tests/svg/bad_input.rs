@@ -139,30 +139,30 @@ fn numbers_that_are_none() {
     check_content(
         "<path id='p' d='M0 0L1e400 1' stroke='red'/>",
         expect![[r##"
-        ["#ok"]
-        #p: bad path data, kept up to the error: invalid number at position 6
-    "##]],
+            ["#ok"]
+            #p: bad path data, kept up to the error: invalid number at position 6
+        "##]],
     );
     check_content(
         "<path id='p' d='M0 0L5 5LNaN 1' stroke='red'/>",
         expect![[r##"
-        ["#ok", "#p"]
-        #p: bad path data, kept up to the error: invalid number at position 10
-    "##]],
+            ["#ok", "#p"]
+            #p: bad path data, kept up to the error: invalid number at position 10
+        "##]],
     );
     check_content(
         "<path id='p' d='M0 0L1e300 1' stroke='red'/>",
         expect![[r##"
-        ["#ok"]
-        #p: coordinates beyond 1 km or not finite, left out
-    "##]],
+            ["#ok"]
+            #p: coordinates beyond 1 km or not finite, left out
+        "##]],
     );
     check_content(
         "<circle id='c' r='1e300'/>",
         expect![[r##"
-        ["#ok"]
-        #c: coordinates beyond 1 km or not finite, left out
-    "##]],
+            ["#ok"]
+            #c: coordinates beyond 1 km or not finite, left out
+        "##]],
     );
     check_content(
         "<circle id='c' r='inf'/>",
@@ -185,15 +185,15 @@ fn values_without_meaning() {
     check_content(
         "<rect id='r' width='2furlongs' height='2'/>",
         expect![[r##"
-        ["#ok", "#r"]
-        #r: unknown unit in width="2furlongs", taken as px
-    "##]],
+            ["#ok", "#r"]
+            #r: unknown unit in width="2furlongs", taken as px
+        "##]],
     );
     check_content(
         "<path id='p' d='M0 0A1e308 1e-308 7 1 1 9 9' stroke='red'/>",
         expect![[r##"
-        ["#ok", "#p"]
-    "##]],
+            ["#ok", "#p"]
+        "##]],
     );
     check_content(
         "<path id='p' transform='scale(0)' d='M0 0L5 5'/>",
@@ -210,19 +210,21 @@ fn values_without_meaning() {
         "##]],
     );
     check_content(
-        "<path id='p' stroke='red' stroke-dasharray='1e-12' d='M0 0L5 5'/>",
+        "<path id='p' stroke='red' stroke-dasharray='1e-12' d='M0 0L5 5'/>\
+         <path id='q' stroke='red' stroke-dasharray='1 1e300' d='M0 0Q1e200 1e300 5 5'/>",
         expect![[r##"
             ["#ok", "#p"]
             #p: more than a million dashes, marked as a full line
+            #q: coordinates beyond 1 km or not finite, left out
         "##]],
     );
     check_content(
         "<text id='t' x='1e400' font-size='1e30'>x</text>",
         expect![[r##"
-        ["#ok"]
-        #t: x="1e400" cannot be read to its end
-        #t: coordinates beyond 1 km or not finite, left out
-    "##]],
+            ["#ok"]
+            #t: x="1e400" cannot be read to its end
+            #t: coordinates beyond 1 km or not finite, left out
+        "##]],
     );
 }
 

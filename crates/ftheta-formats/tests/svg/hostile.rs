@@ -34,8 +34,8 @@ fn deep_nesting() {
     check(
         nested(200),
         expect![[r##"
-        ["#ok"]
-    "##]],
+            ["#ok"]
+        "##]],
     );
     check(
         nested(100_000),
@@ -55,8 +55,8 @@ fn deep_nesting() {
     check_content(
         &spans,
         expect![[r##"
-        ["#ok", "<tspan> on line 1"]
-    "##]],
+            ["#ok", "<tspan> on line 1"]
+        "##]],
     );
 }
 
@@ -65,16 +65,16 @@ fn repeated_content() {
     check_content(
         "<use id='u' href='#u'/>",
         expect![[r##"
-        ["#ok"]
-        #u: refers to "#u", which contains it, left out
-    "##]],
+            ["#ok"]
+            #u: refers to "#u", which contains it, left out
+        "##]],
     );
     check_content(
         "<g id='g'><use xlink:href='#g'/></g>",
         expect![[r##"
-        ["#ok"]
-        <use> on line 1: refers to "#g", which contains it, left out
-    "##]],
+            ["#ok"]
+            <use> on line 1: refers to "#g", which contains it, left out
+        "##]],
     );
     check_content(
         "<g id='a'><use id='u' href='#b'/></g><g id='b'><use id='v' href='#a'/></g>",
@@ -151,9 +151,9 @@ fn too_much_markup_on_one_element() {
     check_content(
         &css,
         expect![[r##"
-        ["#ok"]
-        <style>: too many rules to look at, some were ignored
-    "##]],
+            ["#ok"]
+            <style>: too many rules to look at, some were ignored
+        "##]],
     );
     let slow = format!("<style>x {}path{{fill:red}}</style>", "g ".repeat(40));
     let groups = format!("{}{}{}", "<g>".repeat(200), LINE, "</g>".repeat(200));

@@ -112,17 +112,17 @@ fn pens_by_colour_and_layer() {
         &recipe,
         &SvgOptions::default(),
         expect![[r#"
-        page 20 x 20 mm
-        layer "Deep"
-          stroke red on deep #a: M0,0 L1,0
-          stroke deep #b: M0,0 L1,0
-        layer "flat top"
-          stroke red #c: M0,0 L1,0
-          stroke #0000ff #d: M0,0 L1,0
-        layer ""
-          stroke #00ff00 #e: M0,0 L1,0
-          stroke #0000ff #f: M0,0 L1,0
-    "#]],
+            page 20 x 20 mm
+            layer "Deep"
+              stroke red on deep #a: M0,0 L1,0
+              stroke deep #b: M0,0 L1,0
+            layer "flat top"
+              stroke red #c: M0,0 L1,0
+              stroke #0000ff #d: M0,0 L1,0
+            layer ""
+              stroke #00ff00 #e: M0,0 L1,0
+              stroke #0000ff #f: M0,0 L1,0
+        "#]],
     );
     let job = read(drawing.as_bytes(), &recipe, &SvgOptions::default()).unwrap().value;
     let names: Vec<_> = job.pens.iter().map(|pen| pen.name.as_str()).collect();
@@ -138,7 +138,9 @@ fn what_is_ignored_is_said() {
          <image id='i' href='a.png'/><foreignObject/><script/><flowRoot id='flow'/>
          <path id='bad' d='M0 0h1x3' stroke='red'/><blink id='b'/>
          <rect id='flat' width='3' height='0'/><path id='dot' d='M1 1h0' stroke='red'/>
-         <path id='anim' d='M0 0h1' stroke='red'><animate/></path>
+         <path id='anim' d='M0 0h1' stroke='red' stroke-width='2'><animate/></path>
+         <rect id='paper' width='1' height='1' fill='#fff'/>
+         <text id='up' font-family='Hershey Simplex' style='baseline-shift:super;text-decoration:none'>.</text>
          <metadata/><title/><desc/><foreign xmlns='urn:x'/>",
         expect![[r#"
             page 20 x 20 mm
@@ -146,6 +148,8 @@ fn what_is_ignored_is_said() {
               stroke #ff0000 #p: M0,0 L1,0
               stroke #ff0000 #bad: M0,0 L1,0
               stroke #ff0000 #anim: M0,0 L1,0
+              fill #ffffff #paper: M0,0 L1,0 L1,-1 L0,-1 Z
+              stroke #000000 #up: M2.857142857,1.142857143 L2.285714286,0.571428571 L2.857142857,0 L3.428571429,0.571428571 L2.857142857,1.142857143
             layer "g"
               stroke #ff0000 #q: M0,0 L1,0
             warning: #p: clip-path is ignored, marked unclipped
@@ -159,6 +163,9 @@ fn what_is_ignored_is_said() {
             warning: #flat: its size is not above 0, left out
             warning: #dot: a single point without length, left out
             warning: #anim: <animate> in it is ignored
+            warning: #up: baseline-shift is ignored
+            warning: <svg>: strokes up to 2.000 mm wide are marked along their centre line only (1)
+            warning: <svg>: white areas are marked like any other; give them no fill if they are not meant to be (1)
         "#]],
     );
 }

@@ -1,0 +1,224 @@
+//! The command line contract: one JSON object, exit codes, errors with place, value and limit.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const DRAWING: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm"
+    viewBox="0 0 30 20" fill="none" stroke="black"><rect id="frame" x="5" y="5" width="20"
+    height="10"/><image id="photo" href="x.png"/></svg>"#;
+
+/// A folder with one drawing in it.
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self { folder: TempDir::new().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        let path = self.path(name);
+        fs::write(&path, content).unwrap();
+        path.to_str().unwrap().into()
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_ftheta"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs with `--json`; the exit code and the one object.
+    fn json(&self, arguments: &[&str]) -> (i32, Value) {
+        let output = self.run(&[arguments, &["--json"]].concat());
+        let value = serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
+            panic!("{error}: {output:?}");
+        });
+        (output.status.code().unwrap(), value)
+    }
+
+    /// The error object of a run that must fail with exit code 1.
+    fn fault(&self, arguments: &[&str]) -> Value {
+        let (code, value) = self.json(arguments);
+        assert_eq!(code, 1, "{value}");
+        for key in ["message", "where", "value", "limit"] {
+            assert!(value["error"][key].is_string(), "{key} in {value}");
+        }
+        value["error"].clone()
+    }
+}
+
+fn number(value: &Value, path: &[&str]) -> f64 {
+    path.iter().fold(value, |value, key| &value[key]).as_f64().unwrap_or_else(|| {
+        panic!("no number at {path:?} in {value}");
+    })
+}
+
+#[test]
+fn mark_writes_its_files_and_one_object() {
+    let bench = Bench::new();
+    bench.write("frame.svg", DRAWING);
+    let (code, value) = bench.json(&["mark", "frame.svg", "--out", "result"]);
+    assert_eq!(code, 0);
+    assert!((number(&value, &["plan", "marked_mm"]) - 60.0).abs() < 1e-6);
+    for path in [
+        ["plan", "period_us"],
+        ["plan", "samples"],
+        ["plan", "duration_s"],
+        ["plan", "mark_s"],
+        ["plan", "jump_s"],
+        ["plan", "marks"],
+        ["plan", "jumps"],
+        ["plan", "planning_s"],
+        ["limits", "angle"],
+        ["limits", "speed"],
+        ["limits", "voltage"],
+        ["limits", "current"],
+        ["limits", "heat"],
+        ["limits", "violations"],
+        ["twin", "duration_s"],
+        ["twin", "stray_energy_ratio"],
+    ] {
+        number(&value, &path);
+    }
+    for (group, keys) in [
+        ("contour_error_um", &["max", "p99", "rms"][..]),
+        ("coverage_error_um", &["max", "p99"]),
+        ("end_error_um", &["max", "p99"]),
+        ("dose_ratio", &["min", "p01", "p99", "max"]),
+    ] {
+        keys.iter().for_each(|key| drop(number(&value, &["twin", group, key])));
+    }
+    let warnings = value["warnings"].to_string();
+    assert!(warnings.contains("#photo"), "{warnings}");
+    for (kind, name) in
+        [("plan", "plan.ftheta"), ("image", "mark.png"), ("report", "report.html")]
+    {
+        let path = Path::new("result").join(name);
+        assert_eq!(value["files"][kind].as_str(), path.to_str());
+        assert!(bench.path("result").join(name).is_file());
+    }
+    let (code, verified) = bench.json(&["verify", "result/plan.ftheta"]);
+    assert_eq!((code, &verified["plan"]["id"]), (0, &value["plan"]["id"]));
+    assert_eq!(verified["limits"], value["limits"]);
+}
+
+#[test]
+fn shapes_outside_the_field_are_named_or_clipped() {
+    let bench = Bench::new();
+    bench.write("frame.svg", DRAWING.replace("x=\"5\"", "x=\"95\""));
+    let error = bench.fault(&["mark", "frame.svg"]);
+    assert!(error["where"].as_str().unwrap().contains("#frame"), "{error}");
+    assert!(error["limit"].as_str().unwrap().contains("60.5"), "{error}");
+    assert!(!bench.path("out").join("frame").join("plan.ftheta").exists());
+    let inside = DRAWING.replace("x=\"5\"", "x=\"65\"");
+    bench.write("frame.svg", inside);
+    let (code, value) = bench.json(&["mark", "frame.svg", "--clip"]);
+    assert_eq!(code, 0);
+    assert!(value["warnings"].to_string().contains("#frame"), "{value}");
+}
+
+#[test]
+fn faulty_drawings_are_errors_without_output() {
+    let bench = Bench::new();
+    let deep = "<g>".repeat(100_000);
+    let big = format!("<svg xmlns='http://www.w3.org/2000/svg'>{deep}");
+    let with = |body: &str| {
+        format!("<svg xmlns='http://www.w3.org/2000/svg' width='9mm' height='9mm'>{body}</svg>")
+    };
+    let cases: [(&str, Vec<u8>); 9] = [
+        ("empty", Vec::new()),
+        ("binary", (0..=255).cycle().take(5000).collect()),
+        ("cut", DRAWING.as_bytes()[..150].to_vec()),
+        ("deep", big.into_bytes()),
+        ("loop", with("<g id='a'><use href='#a'/></g>").into_bytes()),
+        ("nothing", with("").into_bytes()),
+        ("nan", with("<path stroke='red' d='M0 0 L NaN 3'/>").into_bytes()),
+        ("huge", with("<path stroke='red' d='M0 0 L 1e300 3'/>").into_bytes()),
+        ("png", b"\x89PNG\r\n\x1a\n".to_vec()),
+    ];
+    for (name, bytes) in cases {
+        let file = format!("{name}.svg");
+        bench.write(&file, bytes);
+        bench.fault(&["mark", &file, "--out", "nowhere"]);
+        assert!(!bench.path("nowhere").join("plan.ftheta").exists(), "{name}");
+    }
+    bench.fault(&["mark", "missing.svg"]);
+    bench.fault(&["mark", "."]);
+}
+
+#[test]
+fn faulty_settings_name_file_line_and_limit() {
+    let bench = Bench::new();
+    bench.write("frame.svg", DRAWING);
+    let error = bench.fault(&["mark", "frame.svg", "--machine", "S99"]);
+    assert!(error["message"].as_str().unwrap().contains("S10-f163"), "{error}");
+    bench.write("m.toml", "[scanner]\nrotor_inertia = 3\n");
+    let error = bench.fault(&["mark", "frame.svg", "--machine", "m.toml"]);
+    assert_eq!(error["where"], "m.toml:1", "{error}");
+    bench.write("frame.recipe.toml", "[[pen]]\npower_w = 50\n");
+    let error = bench.fault(&["mark", "frame.svg"]);
+    assert_eq!((&error["value"], &error["limit"]), (&"50 W".into(), &"0 to 20 W".into()));
+    fs::remove_file(bench.path("frame.recipe.toml")).unwrap();
+    let error = bench.fault(&["mark", "frame.svg", "--speed", "1e8"]);
+    assert!(error["where"].as_str().unwrap().contains("mark_speed"), "{error}");
+    bench.write("a-file", "");
+    bench.fault(&["mark", "frame.svg", "--out", "a-file/below"]);
+}
+
+#[test]
+fn plan_files_that_were_touched_are_refused() {
+    let bench = Bench::new();
+    bench.write("frame.svg", DRAWING);
+    assert_eq!(bench.json(&["mark", "frame.svg", "--out", "result"]).0, 0);
+    let text = fs::read_to_string(bench.path("result/plan.ftheta")).unwrap();
+    bench.write("cut.ftheta", &text[..text.len() / 2]);
+    bench.write("changed.ftheta", text.replace("power_max_w = 20", "power_max_w = 30"));
+    bench.write("other.ftheta", "hello");
+    let error = bench.fault(&["verify", "changed.ftheta"]);
+    assert!(error["message"].as_str().unwrap().contains("id"), "{error}");
+    bench.fault(&["verify", "cut.ftheta"]);
+    bench.fault(&["verify", "other.ftheta"]);
+}
+
+#[test]
+fn usage_errors_exit_with_two() {
+    let bench = Bench::new();
+    for arguments in [
+        &["mark"][..],
+        &["mark", "x.svg", "--speed", "-3"],
+        &["mark", "x.svg", "--speed", "nan"],
+        &["mark", "x.svg", "--mismatch", "f9=1"],
+        &["mark", "x.svg", "--order", "random"],
+        &["fly"],
+    ] {
+        assert_eq!(bench.run(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+    assert_eq!(bench.run(&["mark", "--help"]).status.code(), Some(0));
+}
+
+#[test]
+fn machines_are_listed_shown_and_checked() {
+    let bench = Bench::new();
+    let (_, list) = bench.json(&["machine", "list"]);
+    assert_eq!(list["machines"].as_array().unwrap().len(), 12);
+    let (_, shown) = bench.json(&["machine", "show", "S14-f420"]);
+    bench.write("mine.toml", shown["toml"].as_str().unwrap());
+    let (code, checked) = bench.json(&["machine", "check", "mine.toml"]);
+    assert_eq!(code, 0);
+    assert!((number(&checked, &["servo_lag_us"]) - 224.7).abs() < 0.01);
+    let completions = bench.run(&["completions", "bash"]);
+    assert!(String::from_utf8(completions.stdout).unwrap().contains("--mismatch"));
+}
