@@ -103,8 +103,7 @@ fn mark_writes_its_files_and_one_object() {
     }
     let warnings = value["warnings"].to_string();
     assert!(warnings.contains("#photo"), "{warnings}");
-    for (kind, name) in
-        [("plan", "plan.ftheta"), ("image", "mark.png"), ("report", "report.html")]
+    for (kind, name) in [("plan", "plan.ftheta"), ("image", "mark.png"), ("report", "report.html")]
     {
         let path = Path::new("result").join(name);
         assert_eq!(value["files"][kind].as_str(), path.to_str());

@@ -28,12 +28,7 @@ pub fn to_svg(job: &Job) -> String {
     out
 }
 
-fn write_layer(
-    job: &Job,
-    layer: &Layer,
-    page_from_field: Affine,
-    out: &mut String,
-) -> fmt::Result {
+fn write_layer(job: &Job, layer: &Layer, page_from_field: Affine, out: &mut String) -> fmt::Result {
     let name = escaped(&layer.name);
     writeln!(out, "<g inkscape:groupmode=\"layer\" inkscape:label=\"{name}\">")?;
     for shape in &layer.shapes {

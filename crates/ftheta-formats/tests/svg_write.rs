@@ -22,9 +22,8 @@ fn written_jobs_read_back() {
     );
     let again = read(&svg_write::to_svg(&job));
     assert_eq!(again.page_mm, job.page_mm);
-    let names = |job: &Job| -> Vec<String> {
-        job.layers.iter().map(|layer| layer.name.clone()).collect()
-    };
+    let names =
+        |job: &Job| -> Vec<String> { job.layers.iter().map(|layer| layer.name.clone()).collect() };
     assert_eq!(names(&again), names(&job));
     assert_eq!(again.shapes().count(), job.shapes().count());
     for (found, wanted) in again.shapes().zip(job.shapes()) {

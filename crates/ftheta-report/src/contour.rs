@@ -40,6 +40,8 @@ struct Query {
     expected_mm: f64,
     /// Whole turns around a closed curve, mm.
     shift_mm: f64,
+    /// Arc positions that are searched, before the shift, mm.
+    window_mm: (f64, f64),
     cost: f64,
     foot: Foot,
 }
@@ -119,8 +121,14 @@ impl Contour {
         let length_mm = self.length_mm();
         let expected_mm = before.at_mm + ahead_mm;
         let mut reach_mm = REACH_MM + 4.0 * before.distance_mm;
-        let mut query =
-            Query { beam, expected_mm, shift_mm: 0.0, cost: f64::INFINITY, foot: before };
+        let mut query = Query {
+            beam,
+            expected_mm,
+            shift_mm: 0.0,
+            window_mm: (0.0, 0.0),
+            cost: f64::INFINITY,
+            foot: before,
+        };
         if !self.closed {
             self.search(&mut query, reach_mm, before.segment);
             return query.foot;
@@ -142,6 +150,7 @@ impl Contour {
         let n = self.points.len() - 1;
         let at_mm = query.expected_mm - query.shift_mm;
         let (from_mm, to_mm) = (at_mm - reach_mm, at_mm + reach_mm);
+        query.window_mm = (from_mm, to_mm);
         let outside = |lo: usize, hi: usize| self.arc_mm[hi] < from_mm || to_mm < self.arc_mm[lo];
         let mut i = likely;
         while i + 1 < n && self.arc_mm[i + 1] < at_mm {
@@ -183,7 +192,11 @@ impl Contour {
         let from = self.points[i];
         let way = self.points[i + 1] - from;
         let length_mm = self.arc_mm[i + 1] - self.arc_mm[i];
-        let t = ((query.beam - from).dot(way) / (length_mm * length_mm)).clamp(0.0, 1.0);
+        // A long segment may reach out of the window, to where the curve crosses itself.
+        let lo = ((query.window_mm.0 - self.arc_mm[i]) / length_mm).max(0.0);
+        let hi = ((query.window_mm.1 - self.arc_mm[i]) / length_mm).min(1.0);
+        let t = (query.beam - from).dot(way) / (length_mm * length_mm);
+        let t = t.max(lo).min(hi);
         let distance_sq = (from + t * way).distance_squared(query.beam);
         if distance_sq > query.cost {
             return;

@@ -1,7 +1,7 @@
 //! The field seen from above as inline SVG: marks and jumps, and where the errors are.
 
 use crate::score::{ErrorSample, Score};
-use crate::text::{number, put, tick, tick_step, ticks};
+use crate::text::{escaped, number, put, tick, tick_step, ticks};
 use ftheta_model::plan::PlanDraft;
 use kurbo::{ParamCurve, PathEl, Point, Rect, Shape};
 
@@ -132,6 +132,24 @@ pub fn marks_svg(plan: &PlanDraft) -> String {
     frame.finish()
 }
 
+/// The pens with their colours, speeds and powers.
+pub fn pens_html(plan: &PlanDraft) -> String {
+    let mut out = String::from("<div class=key>");
+    for (pen, color) in plan.pens.iter().zip(PEN_COLORS.iter().cycle()).take(8) {
+        put(
+            &mut out,
+            format_args!(
+                "<span><i style='color:{color}'></i>{}, {} mm/s, {} W</span>",
+                escaped(&pen.name),
+                number(pen.mark_speed_mm_s),
+                number(pen.power_w)
+            ),
+        );
+    }
+    out.push_str("</div>");
+    out
+}
+
 fn draw_jumps(frame: &mut Frame, plan: &PlanDraft) {
     let every = plan.marks.len().div_ceil(N_SEGMENTS_MAX / 2).max(1);
     let mut d = String::new();
@@ -163,8 +181,12 @@ pub fn errors_svg(plan: &PlanDraft, score: &Score) -> String {
         let (x, y) = frame.place(Point::new(sample.x_mm, sample.y_mm));
         put(&mut classes[class.min(ERROR_COLORS.len() - 1)], format_args!("M{x:.1} {y:.1}h0"));
     }
-    for (d, color) in classes.iter().zip(ERROR_COLORS) {
-        put(&mut frame.out, format_args!("<path class=dots stroke='{color}' d='{d}'/>"));
+    for (i, (d, color)) in classes.iter().zip(ERROR_COLORS).enumerate() {
+        let width = 2.0 + 0.4 * i as f64;
+        put(
+            &mut frame.out,
+            format_args!("<path class=dots stroke='{color}' stroke-width='{width:.1}' d='{d}'/>"),
+        );
     }
     if let Some(worst) = score.worst_marks.first() {
         let (x, y) = frame.place(Point::new(worst.x_mm, worst.y_mm));

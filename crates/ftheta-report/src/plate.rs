@@ -207,7 +207,9 @@ fn response(dose: &DoseMap, typical_j: f32, scene: &Scene) -> Vec<f32> {
 /// Shares that picture pixels take of a map pixel around `centre_px`: by overlap where map pixels
 /// are smaller, linearly interpolated where they are larger. First pixel, and shares from there on.
 fn spread(centre_px: f64, size_px: f64, n: usize) -> (usize, Vec<f32>) {
-    let reach_px = if size_px > 1.0 { size_px } else { 0.5 * size_px };
+    // As soft as a lens, so that a fine line stays even when the picture is scaled.
+    let width_px = size_px.max(1.6);
+    let reach_px = if size_px > 1.0 { size_px } else { 0.5 * width_px };
     let first = (centre_px - reach_px).floor().max(0.0) as usize;
     let end = ((centre_px + reach_px).ceil().max(0.0) as usize).min(n);
     let share = |k: usize| {
@@ -215,7 +217,8 @@ fn spread(centre_px: f64, size_px: f64, n: usize) -> (usize, Vec<f32>) {
         if size_px > 1.0 {
             return (1.0 - (lo + 0.5 - centre_px).abs() / size_px).max(0.0);
         }
-        (hi.min(centre_px + reach_px) - lo.max(centre_px - reach_px)).max(0.0)
+        let overlap_px = hi.min(centre_px + reach_px) - lo.max(centre_px - reach_px);
+        overlap_px.max(0.0) * size_px / width_px
     };
     let shares = (first..end).map(|k| share(k) as f32).collect();
     (first.min(n), shares)

@@ -3,7 +3,7 @@
 use crate::axes_view::curves;
 use crate::bars::{dose_svg, limits_svg, split_html};
 use crate::cards::cards;
-use crate::field_view::{error_legend_svg, errors_svg, marks_svg};
+use crate::field_view::{error_legend_svg, errors_svg, marks_svg, pens_html};
 use crate::score::Score;
 use crate::text::{escaped, number, put};
 use base64::Engine;
@@ -15,7 +15,7 @@ use ftheta_model::warning::Warning;
 /// Largest picture that is put into the page, bytes; keeps the page below some 3 MB.
 const PICTURE_MAX: usize = 1_400_000;
 /// Most rows of warnings and of worst marks.
-const N_ROWS_MAX: usize = 12;
+const N_ROWS_MAX: usize = 10;
 /// Everything the report shows.
 #[derive(Clone, Debug)]
 pub struct ReportInput<'a> {
@@ -145,10 +145,11 @@ fn fields(out: &mut String, input: &ReportInput<'_>) {
         out,
         format_args!(
             "<div class=pair><section><h2>Marks and jumps</h2><p class=note>As planned; marks in \
-             the colour of their pen, jumps dashed.</p>{}</section>\
+             the colour of their pen, jumps dashed.</p>{}{}</section>\
              <section><h2>Contour error</h2><p class=note>Distance of the lit beam from its \
              curve; the worst place is ringed.</p>{}{}</section></div>",
             marks_svg(input.plan),
+            pens_html(input.plan),
             errors_svg(input.plan, input.score),
             error_legend_svg(input.score)
         ),

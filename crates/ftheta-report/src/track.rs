@@ -69,7 +69,7 @@ impl MarkTrack {
         self.foot = self.contour.nearest(beam, before, ahead_mm);
         self.beam = beam;
         self.dose.add(before.at_mm, self.foot.at_mm, energy_j);
-        self.path.add(beam, self.foot.at_mm, self.step_mm);
+        self.path.add(beam, self.foot.at_mm, 0.5 * self.step_mm);
         if self.foot.distance_mm > self.worst.0 {
             self.worst = (self.foot.distance_mm, beam);
         }

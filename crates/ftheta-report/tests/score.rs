@@ -9,7 +9,8 @@ use ftheta_model::recipe::Pen;
 use ftheta_model::space::FieldPoint;
 use ftheta_model::trace::{Light, Trace, TracePoint};
 use ftheta_report::score::{Score, Scorer, score};
-use kurbo::{BezPath, Circle, Point, Shape};
+use kurbo::{BezPath, Circle, Line, ParamCurve, ParamCurveNearest, Point, Shape, Vec2};
+use proptest::prelude::*;
 
 const STEP_NS: u64 = 2000;
 
@@ -240,6 +241,59 @@ fn chunks_are_as_good_as_the_whole() {
         let (a, b) = (found.dose_ratio.unwrap(), expected.dose_ratio.unwrap());
         near(a.min, b.min, 1e-9);
         near(a.max, b.max, 1e-9);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        failure_persistence: None,
+        ..ProptestConfig::with_cases(600)
+    })]
+
+    /// Against every point of the beam and of the curve.
+    #[test]
+    fn errors_are_what_a_full_search_finds(
+        places in prop::collection::vec((-4.0..4.0, -4.0..4.0), 4),
+        wave in (0.0..0.02f64, 1.0..9.0f64, 0.0..6.0f64),
+        closed in any::<bool>(),
+    ) {
+        let p: Vec<Point> = places.into_iter().map(Point::from).collect();
+        let mut curve = BezPath::new();
+        curve.move_to(p[0]);
+        curve.curve_to(p[1], p[2], p[3]);
+        if closed {
+            curve.line_to(p[0]);
+        }
+        let segments: Vec<_> = curve.segments().collect();
+        let n = 4000 * segments.len();
+        let at = |k: usize| segments[(k / 4000).min(segments.len() - 1)];
+        let place = |k: usize| at(k).eval((k % 4000) as f64 / 3999.0);
+        let beam = |k: usize| {
+            let phase: f64 = wave.1 * k as f64 / 1000.0 + wave.2;
+            place(k.min(n - 1)) + wave.0 * Vec2::new(phase.sin(), phase.cos())
+        };
+        let end_ns = (n as u64 - 1) * STEP_NS;
+        let found = score(&plan(&[curve]), &trace(&[(0, end_ns)], |t| {
+            beam((t / 2e-6).round() as usize)
+        }));
+        let nearest = |from: Point, to: &dyn Fn(usize) -> Point| {
+            let lines = (1..n).map(|k| Line::new(to(k - 1), to(k)));
+            let squares = lines.map(|line| line.nearest(from, 1e-9).distance_sq);
+            1e3 * squares.fold(f64::INFINITY, f64::min).sqrt()
+        };
+        let some = (0..n).step_by(41);
+        let contour: Vec<f64> = some.clone().map(|k| nearest(beam(k), &place)).collect();
+        let coverage: Vec<f64> = some.map(|k| nearest(place(k), &beam)).collect();
+        let max = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        let mean = contour.iter().map(|v| v * v).sum::<f64>() / contour.len() as f64;
+        // Every 41st place is searched, and no place is farther than the wave is high.
+        let wave_um = 1e3 * wave.0 + 0.4;
+        let (contour_um, coverage_um) = (max(&contour), max(&coverage));
+        let found_um = (found.contour_error_um.max, found.coverage_error_um.max);
+        prop_assert!(contour_um - 0.1 < found_um.0 && found_um.0 < wave_um, "{found_um:?}");
+        prop_assert!(coverage_um - 0.1 < found_um.1 && found_um.1 < wave_um, "{found_um:?}");
+        // Other branches count in the full search only, so it may find less, never more.
+        prop_assert!(found.contour_error_um.rms > 0.98 * mean.sqrt() - 0.1);
     }
 }
 

@@ -9,6 +9,7 @@ pub mod import;
 pub mod machines;
 pub mod mark;
 pub mod output;
+pub mod results;
 pub mod verify;
 
 pub use error::{Error, Fault};

@@ -1,9 +1,7 @@
 //! Writes results so that no file is ever left looking whole when it is not.
 
 use crate::Error;
-use crate::mark::Marked;
 use ftheta_formats::plan_file;
-use ftheta_model::warning::Warning;
 use ftheta_physics::plan::Plan;
 use std::fs;
 use std::io::{BufWriter, Write};
@@ -84,20 +82,4 @@ impl Output {
         }
         Ok(())
     }
-}
-
-/// Adds everything that a marked job leaves behind; returns kind and path of each file.
-///
-/// # Errors
-/// If a file cannot be made or written.
-pub fn write_all(
-    output: &mut Output,
-    _title: &str,
-    marked: &Marked,
-    _warnings: &[Warning],
-) -> Result<Vec<(&'static str, String)>, Error> {
-    output.add_plan("plan.ftheta", &marked.plan)?;
-    Ok([("plan", "plan.ftheta")]
-        .map(|(kind, name)| (kind, output.path(name).display().to_string()))
-        .into())
 }

@@ -8,6 +8,7 @@ use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::warning::Warning;
 use ftheta::output::Output;
 use ftheta::physics::audit::Limits;
+use ftheta::results::{self, About};
 use ftheta::{Error, import, machines};
 use std::path::PathBuf;
 
@@ -40,7 +41,9 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     })?;
     progress.enter("write");
     let warnings: Vec<Warning> = drawing.warnings.iter().chain(&marked.warnings).cloned().collect();
-    let files = ftheta::output::write_all(&mut output, &title(arguments), &marked, &warnings)?;
+    let about =
+        About { job_name: &title(arguments), page_mm: drawing.value.page_mm, warnings: &warnings };
+    let files = results::add(&mut output, &marked, &about)?;
     output.publish()?;
     let stages = progress.finish();
     if as_json {

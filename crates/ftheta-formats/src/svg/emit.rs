@@ -4,7 +4,7 @@ use super::dash::dashed;
 use super::drawing::Node;
 use super::error::SvgError;
 use super::geometry::Geometry;
-use super::style::Paint as StylePaint;
+use super::paint::Paint as StylePaint;
 use super::walk::{Context, Reader};
 use ftheta_model::job::{Paint, Shape};
 use kurbo::{BezPath, PathEl, Point};

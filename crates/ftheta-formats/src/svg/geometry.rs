@@ -6,7 +6,7 @@ use super::length::{self, Direction, LengthBase};
 use super::path_data;
 use kurbo::{Arc, BezPath, Point, Vec2};
 use std::f64::consts::{FRAC_PI_2, TAU};
-use svgtypes::PointsParser;
+use svgtypes::NumberListParser;
 
 /// An element's curves, and what could not be read of them.
 #[derive(Debug, Default)]
@@ -49,8 +49,8 @@ pub fn of(node: Node<'_>, tag: &str, scale: &Scale) -> Option<Geometry> {
             ellipse(&mut lengths, radii, scale.mm_per_unit)
         }
         "line" => line(&mut lengths),
-        "polyline" => polyline(node, false),
-        "polygon" => polyline(node, true),
+        "polyline" => polyline(node, scale, false),
+        "polygon" => polyline(node, scale, true),
         _ => return None,
     };
     geometry.fault = geometry.fault.or(lengths.fault);
@@ -130,22 +130,32 @@ fn line(lengths: &mut Lengths<'_>) -> Geometry {
     Geometry { path, ..Geometry::default() }
 }
 
-fn polyline(node: Node<'_>, closed: bool) -> Geometry {
+fn polyline(node: Node<'_>, scale: &Scale, closed: bool) -> Geometry {
     let text = plain_attribute(node, "points").unwrap_or("");
-    let mut path = BezPath::new();
-    for (x, y) in PointsParser::from(text) {
+    let mut geometry = Geometry { area: true, ..Geometry::default() };
+    let path = &mut geometry.path;
+    let mut numbers = NumberListParser::from(text);
+    while let Some(x) = numbers.next() {
+        let (Ok(x), Some(Ok(y))) = (x, numbers.next()) else {
+            geometry.fault = Some("bad points, kept up to the error".into());
+            break;
+        };
         if path.elements().is_empty() {
             path.move_to((x, y));
         } else {
             path.line_to((x, y));
         }
+        if scale.n_elements_max < path.elements().len() {
+            geometry.cut = true;
+            break;
+        }
     }
     if path.elements().len() < 2 {
-        path = BezPath::new();
+        path.truncate(0);
     } else if closed {
         path.close_path();
     }
-    Geometry { path, area: true, ..Geometry::default() }
+    geometry
 }
 
 fn ellipse(lengths: &mut Lengths<'_>, radii: Vec2, mm_per_unit: f64) -> Geometry {

@@ -16,7 +16,9 @@ mod geometry;
 mod layer;
 mod length;
 mod marking;
+mod nested;
 mod page;
+mod paint;
 mod path_data;
 mod prescan;
 mod style;
@@ -84,6 +86,11 @@ impl Default for Limits {
 /// # Errors
 /// If the file is damaged, beyond a limit, or has nothing that can be marked.
 ///
+/// # Limits
+/// Clips, masks, filters, markers, images and text on a path are left out, each with a warning.
+/// Dashes of a closed line start where kurbo starts them. Text has no kerning and no scripts that
+/// join letters. A pixel is 1/96 in whatever program wrote the file.
+///
 /// # Accuracy
 /// Lines and Bézier curves are kept as they are, in f64; arcs become cubics within 1e-6 mm.
 pub fn read(
@@ -98,11 +105,7 @@ pub fn read(
     if tag_of(root) != Some("svg") {
         return Err(SvgError::NotSvg { tag: root.tag_name().name().into() });
     }
-    let mut reader = Reader::new(&drawing, recipe, options.limits);
-    if options.system_fonts {
-        let message = "fonts of this computer are not supported, the bundled ones are used";
-        reader.warnings.add("<text>", message);
-    }
+    let mut reader = Reader::new(&drawing, recipe, options);
     let page = match Page::of(root, &mut reader.warnings)? {
         Some(page) => page,
         None => {
@@ -138,7 +141,7 @@ fn content_bounds(
     recipe: &Recipe,
     options: &SvgOptions,
 ) -> Result<Rect, SvgError> {
-    let mut reader = Reader::new(drawing, recipe, options.limits);
+    let mut reader = Reader::new(drawing, recipe, options);
     reader.read(&Page::bare())?;
     let job = reader.marking.into_job([0.0, 0.0]);
     job.shapes()

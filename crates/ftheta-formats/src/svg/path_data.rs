@@ -86,7 +86,7 @@ impl Pen {
                 self.line_to(Point::new(self.current.x, y + origin.y));
             }
             PathSegment::CurveTo { x1, y1, x2, y2, x, y, .. } => {
-                self.cubic_to(at(x1, y1), at(x2, y2), at(x, y))
+                self.cubic_to(at(x1, y1), at(x2, y2), at(x, y));
             }
             PathSegment::SmoothCurveTo { x2, y2, x, y, .. } => {
                 let first = self.reflected_control(Last::Cubic);

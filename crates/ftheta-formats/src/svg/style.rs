@@ -1,33 +1,16 @@
 //! Computed style: what an element inherits, overridden by what it states.
 
 use super::declared::{Declared, Property};
-use super::drawing::{Drawing, Node, href_of, tag_of};
+use super::drawing::Drawing;
 use super::length::{self, Direction, LengthBase};
+use super::paint::{Paint, color_rgb};
 use ftheta_model::job::FillRule;
 use std::rc::Rc;
-use std::str::FromStr;
-use svgtypes::{Color, FontShorthand, LengthListParser, PaintFallback};
+use svgtypes::{FontShorthand, LengthListParser};
 
-/// Gradients that refer to each other are followed this far.
-const N_GRADIENT_LINKS_MAX: usize = 32;
-
-/// What an area or a line is painted with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Paint<'a> {
-    /// Nothing: it is not marked.
-    None,
-    /// A colour, RGB.
-    Color([u8; 3]),
-    /// A gradient or pattern, taken as one colour.
-    Server {
-        /// Its first colour, RGB.
-        color_rgb: [u8; 3],
-        /// Its id.
-        id: &'a str,
-    },
-    /// A reference that leads nowhere.
-    Missing(&'a str),
-}
+/// How far browsers raise and lower letters, in sizes of the text around them.
+const SUPERSCRIPT_RISE: f64 = 0.34;
+const SUBSCRIPT_DROP: f64 = 0.2;
 
 /// Where a text is anchored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +26,8 @@ pub enum Anchor {
 /// Inherited properties, in user units.
 #[derive(Clone, Debug)]
 pub struct Style<'a> {
-    color_rgb: [u8; 3],
+    /// What `currentColor` means, RGB.
+    pub color_rgb: [u8; 3],
     /// Paint of areas.
     pub fill: Paint<'a>,
     /// Which side is inside.
@@ -70,6 +54,8 @@ pub struct Style<'a> {
     pub italic: bool,
     /// Where text is anchored.
     pub text_anchor: Anchor,
+    /// How far letters stand above the line.
+    pub baseline_shift: f64,
     /// Added after each letter.
     pub letter_spacing: f64,
     /// Added after each space.
@@ -95,6 +81,7 @@ impl Default for Style<'_> {
             font_weight: 400,
             italic: false,
             text_anchor: Anchor::Start,
+            baseline_shift: 0.0,
             letter_spacing: 0.0,
             word_spacing: 0.0,
         }
@@ -105,14 +92,14 @@ impl<'a> Style<'a> {
     /// Takes over what an element states.
     pub fn apply(&mut self, declared: &Declared<'a>, viewport: [f64; 2], drawing: &Drawing<'a>) {
         self.apply_font(declared, viewport);
-        if let Some(color) = declared.get(Property::Color).and_then(parse_color) {
-            self.color_rgb = rgb(color);
+        if let Some(color) = declared.get(Property::Color).and_then(color_rgb) {
+            self.color_rgb = color;
         }
         if let Some(text) = declared.get(Property::Fill) {
-            self.fill = self.paint(text, drawing).unwrap_or(self.fill);
+            self.fill = Paint::parse(text, self, drawing).unwrap_or(self.fill);
         }
         if let Some(text) = declared.get(Property::Stroke) {
-            self.stroke = self.paint(text, drawing).unwrap_or(self.stroke);
+            self.stroke = Paint::parse(text, self, drawing).unwrap_or(self.stroke);
         }
         match declared.get(Property::FillRule) {
             Some("evenodd") => self.fill_rule = FillRule::EvenOdd,
@@ -141,6 +128,13 @@ impl<'a> Style<'a> {
     }
 
     fn apply_font(&mut self, declared: &Declared<'a>, viewport: [f64; 2]) {
+        // It is measured in the size of the text around it, and adds up.
+        self.baseline_shift += match declared.get(Property::BaselineShift) {
+            Some("super") => SUPERSCRIPT_RISE * self.font_size,
+            Some("sub") => -SUBSCRIPT_DROP * self.font_size,
+            Some(shift) => self.parse_font_size(shift, viewport).unwrap_or(0.0),
+            None => 0.0,
+        };
         let shorthand =
             declared.get(Property::Font).and_then(|text| FontShorthand::from_str(text).ok());
         let size =
@@ -220,27 +214,6 @@ impl<'a> Style<'a> {
         };
         Some(named)
     }
-
-    fn paint(&self, text: &'a str, drawing: &Drawing<'a>) -> Option<Paint<'a>> {
-        Some(match svgtypes::Paint::from_str(text).ok()? {
-            svgtypes::Paint::None => Paint::None,
-            svgtypes::Paint::Inherit => return None,
-            svgtypes::Paint::CurrentColor => Paint::Color(self.color_rgb),
-            svgtypes::Paint::Color(color) => visible_color(color),
-            svgtypes::Paint::FuncIRI(id, fallback) => match (drawing.by_id(id), fallback) {
-                (Some(server), _) => Paint::Server {
-                    color_rgb: first_stop(server, drawing).unwrap_or(self.color_rgb),
-                    id,
-                },
-                (None, Some(PaintFallback::Color(color))) => visible_color(color),
-                (None, Some(PaintFallback::CurrentColor)) => Paint::Color(self.color_rgb),
-                (None, Some(PaintFallback::None)) => Paint::None,
-                (None, None) => Paint::Missing(id),
-            },
-            svgtypes::Paint::ContextFill => self.fill,
-            svgtypes::Paint::ContextStroke => self.stroke,
-        })
-    }
 }
 
 /// Whether a value of `opacity` makes everything invisible.
@@ -275,31 +248,4 @@ fn parse_opacity(text: &str) -> Option<f64> {
         None => text.parse::<f64>().ok()?,
     };
     (!opacity.is_nan()).then(|| opacity.clamp(0.0, 1.0))
-}
-
-fn parse_color(text: &str) -> Option<Color> {
-    Color::from_str(text).ok()
-}
-
-fn rgb(color: Color) -> [u8; 3] {
-    [color.red, color.green, color.blue]
-}
-
-fn visible_color<'a>(color: Color) -> Paint<'a> {
-    if color.alpha == 0 { Paint::None } else { Paint::Color(rgb(color)) }
-}
-
-/// The first colour of a gradient, which may have its stops from another one.
-fn first_stop(server: Node<'_>, drawing: &Drawing<'_>) -> Option<[u8; 3]> {
-    let mut server = drawing.by_id(super::drawing::plain_attribute(server, "id")?)?;
-    for _ in 0..N_GRADIENT_LINKS_MAX {
-        let stop = server.children().find(|child| tag_of(*child) == Some("stop"));
-        if let Some(stop) = stop {
-            let declared = Declared::of(stop, &drawing.style_sheets);
-            let color = declared.get(Property::StopColor).and_then(parse_color);
-            return Some(color.map_or([0; 3], rgb));
-        }
-        server = drawing.by_id(href_of(server)?.strip_prefix('#')?)?;
-    }
-    None
 }

@@ -42,8 +42,7 @@ impl Tally {
         }
         if self.n_white_areas != 0 {
             surprises.push(format!(
-                "white areas are marked like any other; give them no fill if they are not meant \
-                 to be ({})",
+                "white areas are marked too; give them no fill to leave them bare ({})",
                 self.n_white_areas
             ));
         }

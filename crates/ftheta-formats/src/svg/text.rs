@@ -8,8 +8,8 @@ use super::walk::{Context, Reader};
 use svgtypes::LengthListParser;
 
 const XML_NAMESPACE: &str = "http://www.w3.org/XML/1998/namespace";
-/// Characters of one `<text>` that are set.
-const N_CHARACTERS_MAX: usize = 1_000_000;
+/// Characters of one `<text>` that are set; more than a page of any drawing holds.
+const N_CHARACTERS_MAX: usize = 100_000;
 
 /// A character of a text.
 #[derive(Clone, Debug)]
@@ -65,6 +65,13 @@ pub fn mark<'a>(
 ) -> Result<(), SvgError> {
     let mut text = Text { characters: Vec::new(), spans: Vec::new(), placers: Vec::new() };
     span(reader, node, context, &mut text)?;
+    if text.characters.len() == N_CHARACTERS_MAX {
+        return Err(SvgError::TooMany {
+            place: reader.drawing.place(node),
+            what: "characters in one text",
+            limit: N_CHARACTERS_MAX,
+        });
+    }
     if text.characters.last().is_some_and(|last| last.letter == ' ') && !preserves_space(node) {
         text.characters.pop();
     }

@@ -3,16 +3,20 @@
 use super::drawing::Node;
 use super::emit;
 use super::error::SvgError;
-use super::style::{Anchor, Paint, Style};
+use super::paint::Paint;
+use super::style::{Anchor, Style};
 use super::text::{Character, Text};
 use super::walk::Reader;
 use crate::text::outline::{BUNDLED_FAMILY, Typeface};
 use crate::text::{Lettering, hershey};
 use ftheta_model::recipe::TextStyle;
 use kurbo::{Affine, BezPath, Point, Vec2};
+use std::rc::Rc;
 
 /// Slant of italics, which the bundled font has no letters for: 12 degrees.
 const ITALIC_SLANT: f64 = 0.212_556_561_67;
+/// Characters that a warning names; the user sees what kind is missing.
+const N_CHARACTERS_TOLD: usize = 20;
 
 /// Marks all characters of a text; each run of one style is one shape.
 ///
@@ -69,9 +73,9 @@ fn set_chunk<'a>(
         let span_index = characters[0].span_index;
         let style = &text.spans[span_index].1.style;
         let line: String = characters.iter().map(|character| character.letter).collect();
-        let lettering = set_line(reader, node, &line, style);
-        let slanted = style.italic && !is_single_stroke(reader, style);
-        let slant = if slanted { ITALIC_SLANT } else { 0.0 };
+        let font = font_for(reader, style);
+        let lettering = set_line(reader, node, &line, &font);
+        let slant = font.slant;
         let size = style.font_size;
         // Letters are drawn y up, the drawing is y down.
         let shape = Affine::new([size, 0.0, slant * size, -size, 0.0, 0.0]);
@@ -82,7 +86,8 @@ fn set_chunk<'a>(
             pen += Vec2::new(character.place.dx, character.place.dy);
             text_index += character.letter.len_utf8();
             while let Some(letter) = letters.next_if(|letter| letter.text_index < text_index) {
-                path.extend(Affine::translate(pen.to_vec2()) * shape * &letter.path);
+                let place = Affine::translate((pen.x, pen.y - style.baseline_shift));
+                path.extend(place * shape * &letter.path);
                 pen.x += letter.advance_em * size;
             }
             pen.x += style.letter_spacing;
@@ -122,19 +127,43 @@ fn is_single_stroke(reader: &Reader<'_, '_>, style: &Style<'_>) -> bool {
     hershey || reader.recipe.text == TextStyle::SingleStroke
 }
 
-/// Sets a line in the font that `style` asks for, or in the one that is there instead.
-fn set_line<'a>(
-    reader: &mut Reader<'a, '_>,
-    node: Node<'a>,
-    line: &str,
-    style: &Style<'a>,
-) -> Lettering {
-    let (lettering, font) = if is_single_stroke(reader, style) {
-        (hershey::set(line), "Hershey Simplex")
-    } else {
-        warn_of_family(reader, style.font_family);
-        let typeface = Typeface::bundled(style.font_weight);
-        (typeface.set(line), BUNDLED_FAMILY)
+/// The font that a style gets.
+struct Font {
+    face: Face,
+    name: String,
+    /// How far letters lean to the right, per height.
+    slant: f64,
+}
+
+enum Face {
+    SingleStroke,
+    Bundled(&'static Typeface),
+    System(Rc<Typeface>),
+}
+
+fn font_for(reader: &mut Reader<'_, '_>, style: &Style<'_>) -> Font {
+    if is_single_stroke(reader, style) {
+        return Font { face: Face::SingleStroke, name: "Hershey Simplex".into(), slant: 0.0 };
+    }
+    let slant = if style.italic { ITALIC_SLANT } else { 0.0 };
+    let fonts = reader.system_fonts.as_mut();
+    let found =
+        fonts.and_then(|fonts| fonts.find(style.font_family, style.font_weight, style.italic));
+    if let Some(found) = found {
+        let slant = if found.italic { 0.0 } else { slant };
+        return Font { face: Face::System(found.typeface), name: found.family, slant };
+    }
+    warn_of_family(reader, style.font_family);
+    let typeface = Typeface::bundled(style.font_weight);
+    Font { face: Face::Bundled(typeface), name: BUNDLED_FAMILY.into(), slant }
+}
+
+/// Sets a line and tells what its font lacks.
+fn set_line<'a>(reader: &mut Reader<'a, '_>, node: Node<'a>, line: &str, font: &Font) -> Lettering {
+    let lettering = match &font.face {
+        Face::SingleStroke => hershey::set(line),
+        Face::Bundled(typeface) => typeface.set(line),
+        Face::System(typeface) => typeface.set(line),
     };
     for (characters, fate) in
         [(&lettering.missing, "left out"), (&lettering.replaced, "spelt with others")]
@@ -143,9 +172,9 @@ fn set_line<'a>(
             let mut names: Vec<char> = characters.clone();
             names.sort_unstable();
             names.dedup();
-            names.truncate(20);
+            names.truncate(N_CHARACTERS_TOLD);
             let names: String = names.into_iter().collect();
-            let message = format!("no letter in {font} for \"{names}\", {fate}");
+            let message = format!("no letter in {} for \"{names}\", {fate}", font.name);
             reader.warnings.add(reader.drawing.place(node), message);
         }
     }

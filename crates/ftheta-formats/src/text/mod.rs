@@ -2,6 +2,7 @@
 
 pub mod hershey;
 pub mod outline;
+pub mod system;
 
 use kurbo::BezPath;
 

@@ -158,6 +158,13 @@ fn numbers_that_are_none() {
         "##]],
     );
     check_content(
+        "<polyline id='p' points='0,0 1,1 2,2 3 x 4' fill='none' stroke='red'/>",
+        expect![[r##"
+            ["#ok", "#p"]
+            #p: bad points, kept up to the error
+        "##]],
+    );
+    check_content(
         "<circle id='c' r='1e300'/>",
         expect![[r##"
             ["#ok"]

@@ -26,6 +26,13 @@ fn large_files_stop_at_the_limit() {
     let long = format!("{HEAD}<path id='p' stroke='red' d='M0 0{}'/></svg>", "h1v1".repeat(1000));
     let error = read(long.as_bytes(), &Recipe::default(), &options).unwrap_err();
     expect!["#p: more than 1000 path elements"].assert_eq(&error.to_string());
+    let long =
+        format!("{HEAD}<polygon id='q' stroke='red' points='{}'/></svg>", "1 2 ".repeat(2000));
+    let error = read(long.as_bytes(), &Recipe::default(), &options).unwrap_err();
+    expect!["#q: more than 1000 path elements"].assert_eq(&error.to_string());
+    let long = format!("{HEAD}<text id='t'>{}</text></svg>", "x".repeat(200_000));
+    let error = read(long.as_bytes(), &Recipe::default(), &options).unwrap_err();
+    expect!["#t: more than 100000 characters in one text"].assert_eq(&error.to_string());
 }
 
 #[test]

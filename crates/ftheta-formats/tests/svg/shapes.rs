@@ -40,6 +40,7 @@ fn basic_shapes() {
               stroke #ff0000 #poly: M0,0 L1,-2 L3,1 Z
               stroke #ff0000 <line> on line 4: M1,0 L-1,0
               stroke #ff0000 <path> on line 4: M1,-1 L2,-1 L2,-2 L1,-2 Z M1,-1 L0,-1
+            warning: #poly: bad points, kept up to the error
         "#]],
     );
 }

@@ -140,7 +140,8 @@ fn what_is_ignored_is_said() {
          <rect id='flat' width='3' height='0'/><path id='dot' d='M1 1h0' stroke='red'/>
          <path id='anim' d='M0 0h1' stroke='red' stroke-width='2'><animate/></path>
          <rect id='paper' width='1' height='1' fill='#fff'/>
-         <text id='up' font-family='Hershey Simplex' style='baseline-shift:super;text-decoration:none'>.</text>
+         <text id='up' font-family='Hershey' style='dominant-baseline:hanging;
+         text-decoration:none' font-size='4'>|</text>
          <metadata/><title/><desc/><foreign xmlns='urn:x'/>",
         expect![[r#"
             page 20 x 20 mm
@@ -149,7 +150,7 @@ fn what_is_ignored_is_said() {
               stroke #ff0000 #bad: M0,0 L1,0
               stroke #ff0000 #anim: M0,0 L1,0
               fill #ffffff #paper: M0,0 L1,0 L1,-1 L0,-1 Z
-              stroke #000000 #up: M2.857142857,1.142857143 L2.285714286,0.571428571 L2.857142857,0 L3.428571429,0.571428571 L2.857142857,1.142857143
+              stroke #000000 #up: M0.571428571,3.571428571 L0.571428571,-1
             layer "g"
               stroke #ff0000 #q: M0,0 L1,0
             warning: #p: clip-path is ignored, marked unclipped
@@ -163,9 +164,9 @@ fn what_is_ignored_is_said() {
             warning: #flat: its size is not above 0, left out
             warning: #dot: a single point without length, left out
             warning: #anim: <animate> in it is ignored
-            warning: #up: baseline-shift is ignored
+            warning: #up: dominant-baseline is ignored
             warning: <svg>: strokes up to 2.000 mm wide are marked along their centre line only (1)
-            warning: <svg>: white areas are marked like any other; give them no fill if they are not meant to be (1)
+            warning: <svg>: white areas are marked too; give them no fill to leave them bare (1)
         "#]],
     );
 }

@@ -109,6 +109,23 @@ fn places_of_letters() {
 }
 
 #[test]
+fn raised_letters() {
+    check(
+        "<text id='t' font-size='4'>I<tspan id='s' style='baseline-shift:super;font-size:50%'>I\
+         </tspan><tspan id='u' baseline-shift='-25%'>I</tspan></text>",
+        TextStyle::Outline,
+        expect![[r#"
+            fill #000000 #t
+              0.320 0.000 to 0.800 3.040
+            fill #000000 #s
+              1.360 1.360 to 1.600 2.880
+            fill #000000 #u
+              2.120 -1.000 to 2.600 2.040
+        "#]],
+    );
+}
+
+#[test]
 fn anchors() {
     let start = bounds("<text font-size='4'>ftheta</text>");
     let middle = bounds("<text font-size='4' text-anchor='middle'>ftheta</text>");
@@ -168,4 +185,14 @@ fn what_is_replaced_is_said() {
             warning: #u: rotate is ignored
         "#]],
     );
+}
+
+#[test]
+fn fonts_of_the_computer() {
+    let drawing = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 9 9'>\
+                   <text y='9' font-family='No Such Font 9'>x</text></svg>";
+    let options = SvgOptions { system_fonts: true, ..SvgOptions::default() };
+    let imported = read(drawing.as_bytes(), &Recipe::default(), &options).unwrap();
+    let warning = imported.warnings[0].message.as_str();
+    expect![[r#"font "No Such Font 9" is replaced by the bundled B612"#]].assert_eq(warning);
 }
