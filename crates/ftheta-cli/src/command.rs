@@ -6,10 +6,13 @@ pub mod mark;
 pub mod verify;
 
 use crate::arguments::Arguments;
+use crate::screen::say;
 use clap::CommandFactory;
 use clap_complete::Shell;
 
 /// Prints the completion script of a shell.
 pub fn completions(shell: Shell) {
-    clap_complete::generate(shell, &mut Arguments::command(), "ftheta", &mut std::io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "ftheta", &mut script);
+    say!("{}", String::from_utf8_lossy(&script).trim_end());
 }

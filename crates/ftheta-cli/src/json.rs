@@ -1,5 +1,6 @@
 //! The JSON of the command line contract.
 
+use crate::screen::say;
 use ftheta::Fault;
 use ftheta::mark::{Marked, PlanTimes};
 use ftheta::model::plan::Planner;
@@ -11,7 +12,7 @@ use serde_json::{Value, json};
 
 /// Prints the one object of a command.
 pub fn print(value: &Value) {
-    println!("{value}");
+    say!("{value}");
 }
 
 /// An error as an object.

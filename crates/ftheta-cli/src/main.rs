@@ -4,7 +4,9 @@ mod arguments;
 mod command;
 mod json;
 mod progress;
+mod screen;
 
+use crate::screen::note;
 use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
@@ -29,7 +31,7 @@ fn main() -> ExitCode {
             if json {
                 json::print(&json::fault(&fault));
             } else {
-                eprintln!("error: {}", fault.message);
+                note!("error: {}", fault.message);
             }
             ExitCode::FAILURE
         }

@@ -99,7 +99,9 @@ fn mark_writes_its_files_and_one_object() {
         ("end_error_um", &["max", "p99"]),
         ("dose_ratio", &["min", "p01", "p99", "max"]),
     ] {
-        keys.iter().for_each(|key| drop(number(&value, &["twin", group, key])));
+        for key in keys {
+            number(&value, &["twin", group, key]);
+        }
     }
     let warnings = value["warnings"].to_string();
     assert!(warnings.contains("#photo"), "{warnings}");
@@ -190,6 +192,32 @@ fn plan_files_that_were_touched_are_refused() {
     assert!(error["message"].as_str().unwrap().contains("id"), "{error}");
     bench.fault(&["verify", "cut.ftheta"]);
     bench.fault(&["verify", "other.ftheta"]);
+}
+
+/// A run that is killed in the middle leaves no file that looks whole.
+#[test]
+fn killed_runs_leave_nothing_that_looks_whole() {
+    let bench = Bench::new();
+    let area = DRAWING.replace("fill=\"none\"", "");
+    bench.write("area.svg", area);
+    // Hours of marking, so that it cannot be done before it is killed.
+    bench.write("area.recipe.toml", "[[pen]]\nhatch_spacing_mm = 0.002\nmark_speed_mm_s = 10\n");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_ftheta"))
+        .args(["mark", "area.svg", "--out", "result"])
+        .current_dir(bench.folder.path())
+        .spawn()
+        .unwrap();
+    let result = bench.path("result");
+    while !result.is_dir() {
+        assert!(child.try_wait().unwrap().is_none(), "ended by itself");
+        std::thread::yield_now();
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    for entry in fs::read_dir(result).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        assert!(name.starts_with('.'), "{name} was left");
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::arguments::Convert;
 use crate::json;
+use crate::screen::{note, say};
 use ftheta::formats::svg::SvgOptions;
 use ftheta::{Error, convert, import};
 use serde_json::json;
@@ -19,7 +20,7 @@ pub fn run(arguments: &Convert, as_json: bool) -> Result<(), Error> {
         json::print(&json!({"shapes": n_shapes, "files": {"output": file}, "warnings": warnings}));
         return Ok(());
     }
-    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-    println!("{n_shapes} shapes in {file}");
+    warnings.iter().for_each(|warning| note!("warning: {warning}"));
+    say!("{n_shapes} shapes in {file}");
     Ok(())
 }

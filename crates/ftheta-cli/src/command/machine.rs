@@ -2,6 +2,7 @@
 
 use crate::arguments::{Machine, MachineAction};
 use crate::json;
+use crate::screen::say;
 use ftheta::formats::machine::{PRESETS, preset};
 use ftheta::model::machine::{Lens, Machine as MachineFile};
 use ftheta::physics::galvo::Galvo;
@@ -31,12 +32,16 @@ fn list(as_json: bool) -> Result<(), Error> {
         json::print(&json!({"machines": machines}));
         return Ok(());
     }
-    println!(
+    say!(
         "{:10} {:>8} {:>10} {:>9} {:>12}",
-        "preset", "field mm", "focal mm", "spot µm", "laser nm"
+        "preset",
+        "field mm",
+        "focal mm",
+        "spot µm",
+        "laser nm"
     );
     for machine in rows {
-        println!(
+        say!(
             "{:10} {:>8} {:>10.1} {:>9.0} {:>12.0}",
             machine.name,
             machine.optics.field_mm,
@@ -45,7 +50,7 @@ fn list(as_json: bool) -> Result<(), Error> {
             machine.laser.wavelength_nm
         );
     }
-    println!("S10 stands for S10-f163, S14 for S14-f255, S25 for S25-f420");
+    say!("S10 stands for S10-f163, S14 for S14-f255, S25 for S25-f420");
     Ok(())
 }
 
@@ -64,7 +69,7 @@ fn show(name: &str, as_json: bool) -> Result<(), Error> {
     if as_json {
         json::print(&json!({"name": machine.name, "toml": text}));
     } else {
-        print!("{text}");
+        say!("{}", text.trim_end());
     }
     Ok(())
 }
@@ -102,9 +107,9 @@ fn check(name: &str, as_json: bool) -> Result<(), Error> {
         Lens::FTheta { .. } => "F-theta lens",
         Lens::PostObjective { .. } => "post-objective",
     };
-    println!("{}: {lens}, field {} mm: good", machine.name, machine.optics.field_mm);
+    say!("{}: {lens}, field {} mm: good", machine.name, machine.optics.field_mm);
     for (key, value) in rows {
-        println!("  {key:24} {value:.6}");
+        say!("  {key:24} {value:.6}");
     }
     Ok(())
 }

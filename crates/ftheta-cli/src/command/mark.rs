@@ -3,6 +3,7 @@
 use crate::arguments::Mark;
 use crate::json;
 use crate::progress::Progress;
+use crate::screen::{note, say};
 use ftheta::formats::svg::SvgOptions;
 use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::warning::Warning;
@@ -18,7 +19,7 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(&arguments.machine)?;
     let (recipe, recipe_path) = import::recipe_for(&arguments.input, arguments.recipe.as_deref())?;
     if let Some(path) = &recipe_path {
-        note(as_json, &format!("recipe {}", path.display()));
+        note!("recipe   {}", path.display());
     }
     let svg_options = SvgOptions {
         system_fonts: arguments.system_fonts,
@@ -54,15 +55,6 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// A message beside the result: stderr, so that stdout stays one object.
-fn note(as_json: bool, message: &str) {
-    if as_json {
-        eprintln!("{message}");
-    } else {
-        println!("{message}");
-    }
-}
-
 fn title(arguments: &Mark) -> String {
     let stem = arguments.input.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
@@ -74,10 +66,10 @@ fn folder(arguments: &Mark) -> PathBuf {
 
 fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &[(&str, String)]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        note!("warning: {warning}");
     }
     let (times, score) = (&marked.times, &marked.score);
-    println!(
+    say!(
         "plan     {} on {}: {} marks of {:.1} mm, {} jumps",
         marked.plan.id(),
         marked.plan.machine.name,
@@ -85,12 +77,15 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
         times.marked_mm,
         times.n_jumps
     );
-    println!(
+    say!(
         "time     {:.3} s: {:.3} s marking, {:.3} s dark, of which {:.3} s waiting",
-        times.duration_s, times.mark_s, times.jump_s, times.delay_s
+        times.duration_s,
+        times.mark_s,
+        times.jump_s,
+        times.delay_s
     );
     print_limits(marked.plan.limits());
-    println!(
+    say!(
         "twin     contour error {:.1} µm max, {:.1} µm p99; ends {:.1} µm max; coverage {:.1} µm max",
         score.contour_error_um.max,
         score.contour_error_um.p99,
@@ -98,7 +93,7 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
         score.coverage_error_um.max
     );
     if let Some(dose) = score.dose_ratio {
-        println!(
+        say!(
             "dose     {:.3} to {:.3} (p1 to p99), {:.3} max; stray energy {:.2} %",
             dose.p01,
             dose.p99,
@@ -107,16 +102,16 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
         );
     }
     for (kind, path) in files {
-        println!("{kind:8} {path}");
+        say!("{kind:8} {path}");
     }
     let stages: Vec<String> =
         stages.iter().map(|(name, time_s)| format!("{name} {time_s:.2} s")).collect();
-    println!("took     {}", stages.join(", "));
+    say!("took     {}", stages.join(", "));
 }
 
 /// One line of peaks.
 pub fn print_limits(limits: &Limits) {
-    println!(
+    say!(
         "limits   angle {:.0} %, speed {:.1} %, voltage {:.0} %, current {:.0} %, heat {:.1} %",
         limits.angle * 100.0,
         limits.speed * 100.0,

@@ -2,6 +2,7 @@
 
 use crate::arguments::Verify;
 use crate::json;
+use crate::screen::say;
 use ftheta::mark::plan_times;
 use ftheta::{Error, verify};
 use serde_json::json;
@@ -17,8 +18,8 @@ pub fn run(arguments: &Verify, as_json: bool) -> Result<(), Error> {
         }));
         return Ok(());
     }
-    println!("plan {} for {} holds every limit", plan.id(), plan.machine.name);
-    println!("{} marks, {:.3} s, {} samples", plan.marks.len(), times.duration_s, plan.n_samples());
+    say!("plan {} for {} holds every limit", plan.id(), plan.machine.name);
+    say!("{} marks, {:.3} s, {} samples", plan.marks.len(), times.duration_s, plan.n_samples());
     super::mark::print_limits(plan.limits());
     Ok(())
 }
