@@ -103,7 +103,7 @@ fn write_segment(segment: &Segment, out: &mut impl Write) -> io::Result<()> {
 /// Reads a plan file: its content, still to be audited, and the id it claims.
 ///
 /// # Errors
-/// The first line that is not as [`write`] makes it. A file cut short lacks its last line.
+/// The first line that is not as [`write()`] makes it. A file cut short lacks its last line.
 pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
     let mut lines = Lines { lines: text.lines(), number: 0 };
     let header = lines.next("the header of a plan file")?;

@@ -78,7 +78,9 @@ pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayErr
         warnings: Vec::new(),
         n_marks: 0,
     };
-    for shape in job.shapes() {
+    let mut shapes = job.shapes().peekable();
+    while let Some(shape) = shapes.next() {
+        let stroked = shapes.peek().is_some_and(|next| strokes_outline(next, shape));
         let pen = job.pens.get(shape.pen_index).ok_or(LayError::PenMissing {
             place: shape.source.clone(),
             pen_index: shape.pen_index,
@@ -89,7 +91,11 @@ pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayErr
         }
         match (shape.paint, &pen.hatch) {
             (Paint::Stroke, _) => layout.add_outline(shape, pen)?,
-            (Paint::Fill(rule), Some(hatch)) => layout.add_hatch(shape, pen, rule, hatch)?,
+            (Paint::Fill(rule), Some(hatch)) => {
+                let outline = hatch.outline && !stroked;
+                layout.add_hatch(shape, pen, rule, &Hatch { outline, ..*hatch })?;
+            }
+            (Paint::Fill(_), None) if stroked => {}
             (Paint::Fill(_), None) => {
                 layout.warn_no_hatch(shape.pen_index, pen);
                 layout.add_outline(shape, pen)?;
@@ -101,6 +107,11 @@ pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayErr
         value: Toolpath { pens: job.pens.clone(), marks: in_order(units, options) },
         warnings,
     })
+}
+
+/// Whether `next` marks the outline of the area `shape`, so that it is not to be marked twice.
+fn strokes_outline(next: &Shape, shape: &Shape) -> bool {
+    next.paint == Paint::Stroke && next.source == shape.source && next.path == shape.path
 }
 
 /// What has been laid so far.

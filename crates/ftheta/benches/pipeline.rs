@@ -11,11 +11,13 @@ use ftheta::formats::machine::preset;
 use ftheta::formats::svg::SvgOptions;
 use ftheta::import;
 use ftheta::model::block::{Block, SampleSink};
+use ftheta::model::machine::Machine;
 use ftheta::model::space::{DacCodes, FieldPoint};
+use ftheta::model::toolpath::Toolpath;
 use ftheta::model::trace::Trace;
 use ftheta::physics::optics::angles_from_field;
 use ftheta::physics::plan::Plan;
-use ftheta::planner::classic::{Settings, plan};
+use ftheta::planner::classic::{Settings, draft, plan};
 use ftheta::planner::render::Renderer;
 use ftheta::report::score::Scorer;
 use ftheta::toolpath::lay::{LayOptions, lay};
@@ -27,13 +29,19 @@ fn main() {
     divan::main();
 }
 
-fn panel() -> Plan {
+/// The panel's toolpath with its machine and settings.
+fn panel_toolpath() -> (Toolpath, Machine, Settings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gallery/panel.svg");
     let (recipe, _) = import::recipe_for(&path, None).unwrap();
     let job = import::drawing(&path, &recipe, &SvgOptions::default()).unwrap().value;
     let machine = preset("S10").unwrap().unwrap();
     let toolpath = lay(&job, &LayOptions::default()).unwrap().value;
     let settings = Settings::new(&machine, &recipe.classic).unwrap();
+    (toolpath, machine, settings)
+}
+
+fn panel() -> Plan {
+    let (toolpath, machine, settings) = panel_toolpath();
     plan(toolpath, &machine, &settings, 0.01).unwrap()
 }
 
@@ -58,6 +66,17 @@ fn render(bencher: Bencher) {
             black_box(&block);
         }
     });
+}
+
+/// The classic planner without the audit.
+#[divan::bench]
+fn plan_classic(bencher: Bencher) {
+    let (toolpath, machine, settings) = panel_toolpath();
+    let n_samples = draft(toolpath.clone(), &machine, &settings, 0.01).unwrap().n_samples();
+    bencher
+        .counter(ItemsCount::new(n_samples))
+        .with_inputs(|| toolpath.clone())
+        .bench_local_values(|toolpath| draft(toolpath, &machine, &settings, 0.01).unwrap());
 }
 
 #[divan::bench]

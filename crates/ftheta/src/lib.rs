@@ -1,7 +1,7 @@
 //! Open software that moves laser beams with galvanometer mirrors.
 //!
 //! A drawing in, a marked field out: [`import::drawing`] reads a file as a job, [`mark::mark`]
-//! lays, plans, audits and plays it on the digital twin, [`output::write`] writes what came of it.
+//! lays, plans, audits and plays it on the digital twin, [`results::add`] writes what came of it.
 
 pub mod convert;
 pub mod error;

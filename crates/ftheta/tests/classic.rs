@@ -142,6 +142,24 @@ fn other_servos_and_optics_are_played() {
     assert!(marked.score.contour_error_um.max < 30.0, "{:?}", marked.score.contour_error_um);
 }
 
+/// The whole field can be marked, up to its corners, with every preset.
+#[test]
+fn frame_of_the_field_is_within_the_limits() {
+    for name in machine::PRESETS {
+        let machine = preset(name);
+        let side_mm = machine.optics.field_mm;
+        let text = format!(
+            r#"<svg xmlns="http://www.w3.org/2000/svg" width="{side_mm}mm" height="{side_mm}mm"
+                viewBox="0 0 1 1"><path stroke="red" fill="none" d="M0 0H1V1H0Z"/></svg>"#
+        );
+        let recipe = at_speed(3000.0, ClassicRecipe::default());
+        let job = svg::read(text.as_bytes(), &recipe, &svg::SvgOptions::default()).unwrap().value;
+        let options = MarkOptions { order: Order::Keep, ..MarkOptions::default() };
+        let marked = mark(&job, &machine, &recipe, &options, &mut |_| {});
+        assert!(marked.is_ok(), "{name}: {:?}", marked.err());
+    }
+}
+
 #[test]
 fn faults_are_errors_that_name_place_value_and_limit() {
     let machine = preset("S10");

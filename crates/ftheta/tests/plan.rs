@@ -32,7 +32,7 @@ fn draft() -> PlanDraft {
 fn refusal(tamper: impl FnOnce(&mut PlanDraft)) -> AuditError {
     let mut draft = draft();
     tamper(&mut draft);
-    Plan::new(draft).err().expect("the audit must refuse")
+    Plan::new(draft).expect_err("the audit must refuse")
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn audit_refuses_gaps_and_wrong_indices() {
 #[test]
 fn audit_refuses_what_the_motors_cannot() {
     let error = refusal(|draft| draft.machine.scanner.angle_max_rad = 0.01);
-    assert!(matches!(error, AuditError::Limit { quantity: "mirror angle", .. }), "{error}");
+    assert!(matches!(error, AuditError::Limit { quantity: "commanded angle", .. }), "{error}");
     let error = refusal(|draft| draft.machine.scanner.speed_max_rad_s = 2.0);
     assert!(matches!(error, AuditError::Limit { quantity: "mirror speed", .. }), "{error}");
     let error = refusal(|draft| draft.machine.scanner.current_rms_a = 1e-3);

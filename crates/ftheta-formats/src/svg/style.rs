@@ -54,6 +54,8 @@ pub struct Style<'a> {
     pub italic: bool,
     /// Where text is anchored.
     pub text_anchor: Anchor,
+    /// Which height of the letters is on the line, in font sizes above their feet.
+    pub line_em: f64,
     /// How far letters stand above the line.
     pub baseline_shift: f64,
     /// Added after each letter.
@@ -81,6 +83,7 @@ impl Default for Style<'_> {
             font_weight: 400,
             italic: false,
             text_anchor: Anchor::Start,
+            line_em: 0.0,
             baseline_shift: 0.0,
             letter_spacing: 0.0,
             word_spacing: 0.0,
@@ -128,6 +131,9 @@ impl<'a> Style<'a> {
     }
 
     fn apply_font(&mut self, declared: &Declared<'a>, viewport: [f64; 2]) {
+        if let Some(name) = declared.get(Property::DominantBaseline) {
+            self.line_em = line_em(name);
+        }
         // It is measured in the size of the text around it, and adds up.
         self.baseline_shift += match declared.get(Property::BaselineShift) {
             Some("super") => SUPERSCRIPT_RISE * self.font_size,
@@ -248,4 +254,18 @@ fn parse_opacity(text: &str) -> Option<f64> {
         None => text.parse::<f64>().ok()?,
     };
     (!opacity.is_nan()).then(|| opacity.clamp(0.0, 1.0))
+}
+
+/// The height that a value of `dominant-baseline` means, in font sizes above the letters' feet.
+///
+/// Half of x, half of the line, the capitals, the top and the bottom of the bundled font.
+fn line_em(name: &str) -> f64 {
+    match name {
+        "middle" => 0.275,
+        "central" | "mathematical" => 0.36,
+        "hanging" => 0.75,
+        "text-before-edge" | "text-top" => 0.965,
+        "text-after-edge" | "text-bottom" | "ideographic" => -0.25,
+        _ => 0.0,
+    }
 }

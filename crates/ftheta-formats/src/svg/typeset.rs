@@ -77,6 +77,7 @@ fn set_chunk<'a>(
         let lettering = set_line(reader, node, &line, &font);
         let slant = font.slant;
         let size = style.font_size;
+        let drop = style.line_em * size - style.baseline_shift;
         // Letters are drawn y up, the drawing is y down.
         let shape = Affine::new([size, 0.0, slant * size, -size, 0.0, 0.0]);
         let mut path = BezPath::new();
@@ -86,7 +87,7 @@ fn set_chunk<'a>(
             pen += Vec2::new(character.place.dx, character.place.dy);
             text_index += character.letter.len_utf8();
             while let Some(letter) = letters.next_if(|letter| letter.text_index < text_index) {
-                let place = Affine::translate((pen.x, pen.y - style.baseline_shift));
+                let place = Affine::translate((pen.x, pen.y + drop));
                 path.extend(place * shape * &letter.path);
                 pen.x += letter.advance_em * size;
             }

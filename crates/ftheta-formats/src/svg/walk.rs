@@ -36,8 +36,9 @@ pub struct Context<'a> {
 impl Context<'_> {
     /// Greatest scale of the user units, mm; never zero.
     pub fn mm_per_unit(&self) -> f64 {
+        // The greatest singular value: a matrix is a similarity plus a mirrored similarity.
         let [a, b, c, d, ..] = self.field_from_user.as_coeffs();
-        let scale = a.hypot(b).max(c.hypot(d));
+        let scale = 0.5 * ((a + d).hypot(b - c) + (a - d).hypot(b + c));
         if scale.is_normal() { scale } else { 1.0 }
     }
 }
@@ -200,7 +201,6 @@ impl<'a, 'r> Reader<'a, 'r> {
             (Property::MarkerMid, "markers are ignored"),
             (Property::MarkerEnd, "markers are ignored"),
             (Property::TransformOrigin, "transform-origin is ignored"),
-            (Property::DominantBaseline, "dominant-baseline is ignored"),
             (Property::TextDecoration, "text-decoration is ignored"),
             (Property::WritingMode, "writing-mode is ignored"),
         ];

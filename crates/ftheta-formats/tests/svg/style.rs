@@ -140,7 +140,7 @@ fn what_is_ignored_is_said() {
          <rect id='flat' width='3' height='0'/><path id='dot' d='M1 1h0' stroke='red'/>
          <path id='anim' d='M0 0h1' stroke='red' stroke-width='2'><animate/></path>
          <rect id='paper' width='1' height='1' fill='#fff'/>
-         <text id='up' font-family='Hershey' style='dominant-baseline:hanging;
+         <text id='up' font-family='Hershey' style='writing-mode:tb;
          text-decoration:none' font-size='4'>|</text>
          <metadata/><title/><desc/><foreign xmlns='urn:x'/>",
         expect![[r#"
@@ -164,7 +164,7 @@ fn what_is_ignored_is_said() {
             warning: #flat: its size is not above 0, left out
             warning: #dot: a single point without length, left out
             warning: #anim: <animate> in it is ignored
-            warning: #up: dominant-baseline is ignored
+            warning: #up: writing-mode is ignored
             warning: <svg>: strokes up to 2.000 mm wide are marked along their centre line only (1)
             warning: <svg>: white areas are marked too; give them no fill to leave them bare (1)
         "#]],

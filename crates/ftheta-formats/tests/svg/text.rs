@@ -112,7 +112,8 @@ fn places_of_letters() {
 fn raised_letters() {
     check(
         "<text id='t' font-size='4'>I<tspan id='s' style='baseline-shift:super;font-size:50%'>I\
-         </tspan><tspan id='u' baseline-shift='-25%'>I</tspan></text>",
+         </tspan><tspan id='u' baseline-shift='-25%'>I</tspan></text>\
+         <text id='v' font-size='4' dominant-baseline='hanging'>I</text>",
         TextStyle::Outline,
         expect![[r#"
             fill #000000 #t
@@ -121,6 +122,8 @@ fn raised_letters() {
               1.360 1.360 to 1.600 2.880
             fill #000000 #u
               2.120 -1.000 to 2.600 2.040
+            fill #000000 #v
+              0.320 -3.000 to 0.800 0.040
         "#]],
     );
 }
