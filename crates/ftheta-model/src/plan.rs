@@ -100,6 +100,26 @@ impl PlanDraft {
     }
 }
 
+impl Motion {
+    /// Index of the vertex it starts on.
+    pub fn first_vertex(&self) -> usize {
+        match *self {
+            Self::Hold { vertex } => vertex as usize,
+            Self::Travel { first_vertex, .. } => first_vertex as usize,
+        }
+    }
+
+    /// Index of the vertex it ends on.
+    pub fn last_vertex(&self) -> usize {
+        match *self {
+            Self::Hold { vertex } => vertex as usize,
+            Self::Travel { first_vertex, n_vertices, .. } => {
+                first_vertex as usize + n_vertices as usize - 1
+            }
+        }
+    }
+}
+
 impl SpeedProfile {
     /// Highest speed that is reached: less than `speed_mm_s` where the path is too short.
     pub fn peak_speed_mm_s(&self) -> f64 {

@@ -83,7 +83,7 @@ impl<'a> Renderer<'a> {
                 self.segment_index += 1;
                 self.n_rendered = 0;
                 if let Some(next) = self.plan.segments.get(self.segment_index) {
-                    self.cursor = Cursor::at(&self.plan.vertices, first_vertex(&next.motion));
+                    self.cursor = Cursor::at(&self.plan.vertices, next.motion.first_vertex());
                 }
             }
         }
@@ -107,8 +107,8 @@ impl<'a> Renderer<'a> {
                     words.push(self.words.at(start + step * f64::from(tick)));
                 }
             }
-            Motion::Travel { first_vertex, n_vertices, profile, .. } => {
-                let last = (first_vertex + n_vertices) as usize - 1;
+            Motion::Travel { profile, .. } => {
+                let last = motion.last_vertex();
                 let constant = profile.acceleration_mm_s2 == f64::INFINITY
                     && profile.deceleration_mm_s2 == f64::INFINITY;
                 for tick in first..=end {
@@ -206,12 +206,5 @@ impl Words<'_> {
         angles_from_field(&self.plan.machine.optics, place.into())
             .map(|angles| [angles.x_rad, angles.y_rad])
             .expect("the audit has reached every place of the plan")
-    }
-}
-
-fn first_vertex(motion: &Motion) -> usize {
-    match *motion {
-        Motion::Hold { vertex } => vertex as usize,
-        Motion::Travel { first_vertex, .. } => first_vertex as usize,
     }
 }

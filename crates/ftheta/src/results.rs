@@ -20,8 +20,8 @@ pub struct About<'a> {
     pub warnings: &'a [Warning],
 }
 
-/// Pixels along the longest side of the picture inside the report.
-const REPORT_PICTURE_PX: u32 = 1200;
+/// Pixels along the longest side of the picture, which the report shows as well.
+const PICTURE_PX: u32 = 1800;
 
 /// Adds the files of a marked job; returns kind and path of each.
 ///
@@ -33,10 +33,9 @@ pub fn add(
     about: &About<'_>,
 ) -> Result<Vec<(&'static str, String)>, Error> {
     let page_mm = Some(about.page_mm);
-    let options = PlateOptions { page_mm, ..PlateOptions::default() };
+    let options = PlateOptions { page_mm, longest_side_px: PICTURE_PX };
     let picture = plate_png(&marked.dose, &options);
-    let small = PlateOptions { longest_side_px: REPORT_PICTURE_PX, ..options };
-    let report = report(marked, about, &plate_png(&marked.dose, &small));
+    let report = report(marked, about, &picture);
     output.add_plan("plan.ftheta", &marked.plan)?;
     output.add("mark.png", |out| out.write_all(&picture))?;
     output.add("report.html", |out| out.write_all(report.as_bytes()))?;

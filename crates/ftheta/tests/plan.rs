@@ -4,6 +4,7 @@
 
 use ftheta::formats::{machine, plan_file, svg};
 use ftheta::model::block::Block;
+use ftheta::model::machine::Lens;
 use ftheta::model::plan::{Motion, PlanDraft};
 use ftheta::model::recipe::Recipe;
 use ftheta::model::space::FieldPoint;
@@ -53,6 +54,14 @@ fn audit_refuses_gaps_and_wrong_indices() {
         assert!(matches!(error, AuditError::Malformed { .. }), "{error}");
     };
     malformed(refusal(|draft| draft.segments.clear()));
+    // A length that its vertices do not have would let `render` run past the last one.
+    malformed(refusal(|draft| {
+        let travel = draft.segments.iter_mut().find_map(|segment| match &mut segment.motion {
+            Motion::Travel { profile, .. } => Some(profile),
+            Motion::Hold { .. } => None,
+        });
+        travel.unwrap().length_mm *= 1.01;
+    }));
     malformed(refusal(|draft| draft.segments.truncate(3)));
     malformed(refusal(|draft| draft.segments.swap(1, 3)));
     malformed(refusal(|draft| draft.segments[2].n_ticks = 0));
@@ -73,7 +82,8 @@ fn audit_refuses_what_the_motors_cannot() {
     assert!(matches!(error, AuditError::Limit { quantity: "mirror speed", .. }), "{error}");
     let error = refusal(|draft| draft.machine.scanner.current_rms_a = 1e-3);
     assert!(matches!(error, AuditError::Limit { quantity: "coil heat", .. }), "{error}");
-    let far = refusal(|draft| draft.vertices.iter_mut().for_each(|vertex| vertex.x *= 1e3));
+    let lens = Lens::FTheta { coefficients_mm: vec![1.0] };
+    let far = refusal(|draft| draft.machine.optics.lens = lens);
     assert!(matches!(far, AuditError::Unreachable { .. }), "{far}");
 }
 

@@ -2,6 +2,7 @@
 
 use super::AuditError;
 use ftheta_model::plan::{Motion, PlanDraft};
+use ftheta_model::recipe::Interpolation;
 use ftheta_model::space::FieldPoint;
 use kurbo::Point;
 
@@ -41,16 +42,16 @@ impl<'a> Walk<'a> {
     fn enter(&mut self) {
         self.leg_start_mm = 0.0;
         if let Some(segment) = self.draft.segments.get(self.segment_index) {
-            self.leg = first_vertex(&segment.motion);
+            self.leg = segment.motion.first_vertex();
         }
     }
 
     fn place(&mut self, motion: &Motion, last: bool) -> Point {
         let vertices = &self.draft.vertices;
-        let &Motion::Travel { first_vertex, n_vertices, profile, .. } = motion else {
+        let &Motion::Travel { profile, .. } = motion else {
             return vertices[self.leg];
         };
-        let end = (first_vertex + n_vertices) as usize - 1;
+        let end = motion.last_vertex();
         if last {
             return vertices[end];
         }
@@ -61,26 +62,11 @@ impl<'a> Walk<'a> {
             let length_mm = from.distance(to);
             let along_mm = distance_mm - self.leg_start_mm;
             if along_mm <= length_mm || self.leg + 1 == end {
-                return from.lerp(to, (along_mm / length_mm).min(1.0));
+                let share = if length_mm > 0.0 { (along_mm / length_mm).min(1.0) } else { 1.0 };
+                return from.lerp(to, share);
             }
             self.leg_start_mm += length_mm;
             self.leg += 1;
-        }
-    }
-}
-
-fn first_vertex(motion: &Motion) -> usize {
-    match *motion {
-        Motion::Hold { vertex } => vertex as usize,
-        Motion::Travel { first_vertex, .. } => first_vertex as usize,
-    }
-}
-
-fn last_vertex(motion: &Motion) -> usize {
-    match *motion {
-        Motion::Hold { vertex } => vertex as usize,
-        Motion::Travel { first_vertex, n_vertices, .. } => {
-            first_vertex as usize + n_vertices as usize - 1
         }
     }
 }
@@ -106,23 +92,38 @@ pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
         if segment.mark_index.is_some_and(|mark| mark as usize >= draft.marks.len()) {
             return Err(malformed(place(), "its mark does not exist"));
         }
-        if let Motion::Travel { n_vertices, profile, .. } = segment.motion {
-            let positive = |value: f64| value > 0.0;
-            if n_vertices < 2
-                || !(profile.length_mm.is_finite() && profile.speed_mm_s.is_finite())
-                || !(positive(profile.length_mm) && positive(profile.speed_mm_s))
-                || !(positive(profile.acceleration_mm_s2) && positive(profile.deceleration_mm_s2))
-            {
-                return Err(malformed(place(), "its speed profile is impossible"));
-            }
-        }
-        if last_vertex(&segment.motion) >= draft.vertices.len() {
+        if segment.motion.last_vertex() >= draft.vertices.len() {
             return Err(malformed(place(), "its vertices do not exist"));
         }
-        if draft.vertices[first_vertex(&segment.motion)] != at {
+        check_profile(draft, &segment.motion).map_err(|what| malformed(place(), what))?;
+        if draft.vertices[segment.motion.first_vertex()] != at {
             return Err(malformed(place(), "it does not start where the one before ends"));
         }
-        at = draft.vertices[last_vertex(&segment.motion)];
+        at = draft.vertices[segment.motion.last_vertex()];
+    }
+    Ok(())
+}
+
+/// Checks a travel's speed profile against its vertices: `render` trusts the length.
+fn check_profile(draft: &PlanDraft, motion: &Motion) -> Result<(), &'static str> {
+    let &Motion::Travel { n_vertices, profile, interpolation, .. } = motion else {
+        return Ok(());
+    };
+    let positive = |value: f64| value > 0.0;
+    if n_vertices < 2
+        || !(profile.length_mm.is_finite() && profile.speed_mm_s.is_finite())
+        || !(positive(profile.length_mm) && positive(profile.speed_mm_s))
+        || !(positive(profile.acceleration_mm_s2) && positive(profile.deceleration_mm_s2))
+    {
+        return Err("its speed profile is impossible");
+    }
+    if interpolation == Interpolation::Dda && n_vertices != 2 {
+        return Err("a DDA takes one vector at a time");
+    }
+    let vertices = &draft.vertices[motion.first_vertex()..=motion.last_vertex()];
+    let length_mm: f64 = vertices.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+    if (length_mm - profile.length_mm).abs() > 1e-9 * (1.0 + length_mm) {
+        return Err("its profile is not as long as its vertices");
     }
     Ok(())
 }
