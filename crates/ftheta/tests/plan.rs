@@ -83,7 +83,12 @@ fn audit_refuses_what_the_motors_cannot() {
     let error = refusal(|draft| draft.machine.scanner.current_rms_a = 1e-3);
     assert!(matches!(error, AuditError::Limit { quantity: "coil heat", .. }), "{error}");
     let lens = Lens::FTheta { coefficients_mm: vec![1.0] };
-    let far = refusal(|draft| draft.machine.optics.lens = lens);
+    let far = refusal(|draft| {
+        draft.machine.optics.lens = lens;
+        draft.machine.scanner.angle_max_rad = 0.8;
+        draft.machine.scanner.speed_max_rad_s = 1e6;
+        draft.machine.scanner.current_rms_a = 100.0;
+    });
     assert!(matches!(far, AuditError::Unreachable { .. }), "{far}");
 }
 
