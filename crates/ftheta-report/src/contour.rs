@@ -8,9 +8,11 @@ const FLATTEN_MM: f64 = 2e-5;
 const LEAF: usize = 8;
 /// Least arc length to either side of the expected place that is searched, mm.
 const REACH_MM: f64 = 0.75;
+/// Distance from which on the whole curve is searched, mm.
+const NEAR_MM: f64 = 0.004;
 /// Weight of the squared arc distance from the expected place against the squared distance. Only
-/// decides between branches that lie on each other; costs 0.1 nm of distance otherwise.
-const TIE_WEIGHT: f64 = 1e-6;
+/// decides between branches that lie on each other.
+const TIE_WEIGHT: f64 = 1e-9;
 
 /// A polyline with arc lengths and a tree of bounding boxes.
 pub struct Contour {
@@ -42,14 +44,37 @@ struct Query {
     shift_mm: f64,
     /// Arc positions that are searched, before the shift, mm.
     window_mm: (f64, f64),
+    /// Weight of the squared arc distance from the expected place.
+    tie_weight: f64,
     cost: f64,
     foot: Foot,
+}
+
+impl Query {
+    fn new(beam: Point, expected_mm: f64, tie_weight: f64) -> Self {
+        Self {
+            beam,
+            expected_mm,
+            shift_mm: 0.0,
+            window_mm: (0.0, 0.0),
+            tie_weight,
+            cost: f64::INFINITY,
+            foot: Foot { at_mm: expected_mm, distance_mm: f64::INFINITY, segment: 0 },
+        }
+    }
 }
 
 impl Contour {
     /// A curve of one subpath, within 0.02 µm of the exact one.
     pub fn new(curve: &BezPath) -> Self {
-        let points = flattened(curve);
+        let mut contour = Self::through(flattened(curve));
+        let points = &contour.points;
+        contour.closed = points.len() > 2 && points[0].distance(points[points.len() - 1]) < 1e-6;
+        contour
+    }
+
+    /// An open polyline through two points or more, neighbours apart.
+    pub fn through(points: Vec<Point>) -> Self {
         let mut arc_mm = Vec::with_capacity(points.len());
         let mut at_mm = 0.0;
         arc_mm.push(0.0);
@@ -57,14 +82,23 @@ impl Contour {
             at_mm += pair[0].distance(pair[1]);
             arc_mm.push(at_mm);
         }
-        let mut contour = Self {
-            closed: points.len() > 2 && points[0].distance(points[points.len() - 1]) < 1e-6,
-            boxes: vec![Rect::ZERO; 4 * points.len().div_ceil(LEAF).next_power_of_two()],
-            points,
-            arc_mm,
-        };
+        let n_leaves = points.len().div_ceil(LEAF).next_power_of_two();
+        let boxes = vec![Rect::ZERO; 4 * n_leaves];
+        let mut contour = Self { points, arc_mm, closed: false, boxes };
         contour.fill_boxes();
         contour
+    }
+
+    /// The points of the polyline.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// The segment nearest to `place`, and its distance, mm; looked for around `likely` first.
+    pub fn nearest_segment(&self, place: Point, likely: usize) -> (usize, f64) {
+        let mut query = Query::new(place, self.arc_mm[likely], 0.0);
+        self.search(&mut query, f64::INFINITY, likely.min(self.points.len() - 2));
+        (query.foot.segment, query.foot.distance_mm)
     }
 
     /// Length of the whole, mm.
@@ -106,34 +140,44 @@ impl Contour {
         }
     }
 
-    /// The point nearest to `beam` around the start, for a beam `off_mm` from there.
+    /// The point nearest to `beam` within 0.75 mm of arc, and four times `off_mm`, from the start.
     pub fn nearest_to_start(&self, beam: Point, off_mm: f64) -> Foot {
         let start = Foot { at_mm: 0.0, distance_mm: off_mm, segment: 0 };
-        self.nearest(beam, start, 0.0)
+        self.nearest_within(beam, start, 0.0, REACH_MM + 4.0 * off_mm)
+    }
+
+    /// The point nearest to `beam` around the end, unless `foot` is much nearer elsewhere.
+    pub fn nearest_to_end(&self, beam: Point, foot: Foot) -> Foot {
+        let ahead_mm = self.length_mm() - foot.at_mm;
+        let reach_mm = REACH_MM + 4.0 * foot.distance_mm;
+        let found = self.nearest_within(beam, foot, ahead_mm, reach_mm);
+        if found.distance_mm <= 2.0 * foot.distance_mm { found } else { foot }
     }
 
     /// The point nearest to `beam`, which went on by `ahead_mm` from where `before` was nearest.
     ///
     /// # Limits
-    /// Searched are 0.75 mm of arc and four times the last distance to either side, so that a beam
-    /// stays on its own branch where the curve crosses itself farther away along it.
+    /// While the beam is within 4 µm, only 0.75 mm of arc to either side are searched, so that it
+    /// stays on its branch where the curve comes near itself. Beyond that the whole curve is.
     pub fn nearest(&self, beam: Point, before: Foot, ahead_mm: f64) -> Foot {
+        let near = self.nearest_within(beam, before, ahead_mm, REACH_MM);
+        if near.distance_mm < NEAR_MM {
+            return near;
+        }
+        let any = self.nearest_within(beam, before, ahead_mm, f64::INFINITY);
+        if any.distance_mm < near.distance_mm { any } else { near }
+    }
+
+    fn nearest_within(&self, beam: Point, before: Foot, ahead_mm: f64, reach_mm: f64) -> Foot {
         let length_mm = self.length_mm();
         let expected_mm = before.at_mm + ahead_mm;
-        let mut reach_mm = REACH_MM + 4.0 * before.distance_mm;
-        let mut query = Query {
-            beam,
-            expected_mm,
-            shift_mm: 0.0,
-            window_mm: (0.0, 0.0),
-            cost: f64::INFINITY,
-            foot: before,
-        };
+        let mut query = Query::new(beam, expected_mm, TIE_WEIGHT);
+        query.foot = before;
         if !self.closed {
             self.search(&mut query, reach_mm, before.segment);
             return query.foot;
         }
-        reach_mm = reach_mm.min(0.5 * length_mm);
+        let reach_mm = reach_mm.min(0.5 * length_mm);
         let turn = (expected_mm / length_mm).floor();
         for shift in [turn, turn - 1.0, turn + 1.0] {
             query.shift_mm = shift * length_mm;
@@ -152,6 +196,10 @@ impl Contour {
         let (from_mm, to_mm) = (at_mm - reach_mm, at_mm + reach_mm);
         query.window_mm = (from_mm, to_mm);
         let outside = |lo: usize, hi: usize| self.arc_mm[hi] < from_mm || to_mm < self.arc_mm[lo];
+        if n <= 3 {
+            (0..n).filter(|&i| !outside(i, i + 1)).for_each(|i| self.look_at(i, query));
+            return;
+        }
         let mut i = likely;
         while i + 1 < n && self.arc_mm[i + 1] < at_mm {
             i += 1;
@@ -163,10 +211,6 @@ impl Contour {
             if !outside(near, near + 1) {
                 self.look_at(near, query);
             }
-        }
-        if n <= 3 {
-            (0..n).filter(|&i| !outside(i, i + 1)).for_each(|i| self.look_at(i, query));
-            return;
         }
         let mut stack = [(0usize, 0usize, 0usize); 64];
         stack[0] = (0, 0, n);
@@ -203,7 +247,7 @@ impl Contour {
         }
         let at_mm = self.arc_mm[i] + t * length_mm + query.shift_mm;
         let ahead_mm = at_mm - query.expected_mm;
-        let cost = distance_sq + TIE_WEIGHT * ahead_mm * ahead_mm;
+        let cost = distance_sq + query.tie_weight * ahead_mm * ahead_mm;
         if cost < query.cost {
             query.cost = cost;
             query.foot = Foot { at_mm, distance_mm: distance_sq.sqrt(), segment: i };

@@ -224,7 +224,7 @@ pub fn error_legend_svg(score: &Score) -> String {
         );
     }
     let label = number(top_um);
-    put(&mut out, format_args!("<text x='440' y='26' text-anchor=middle>{label} µm</text></svg>"));
+    put(&mut out, format_args!("<text x='457' y='26' text-anchor=end>{label} µm</text></svg>"));
     out
 }
 

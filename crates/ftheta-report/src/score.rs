@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 /// Extremes, rms, energies and times are exact; percentiles of errors are within 0.5 %, those of
 /// the dose within 0.05 %. Curves are followed within 0.02 µm and sampled every 1 µm (marks longer
 /// than 4 m coarser). The dose of a beam 10 µm beside a bend of 2 mm radius is within 0.3 %.
-/// Nearest points are searched within 0.75 mm of arc around the expected one.
+/// While the beam is within 4 µm of its curve, nearest points are searched within 0.75 mm of arc.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
     /// Distance of the lit beam to its own mark's curve, over time.

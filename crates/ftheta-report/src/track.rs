@@ -47,7 +47,7 @@ impl MarkTrack {
         let off_mm = start.map_or(0.0, |(_, start)| start.distance(beam));
         let foot = contour.nearest_to_start(beam, off_mm);
         let mut path = BeamPath::default();
-        path.add(beam, foot.at_mm, 0.0);
+        path.add(beam, 0.0);
         Self {
             mark_index,
             before_start_mm: contour.before_start_mm(beam, foot),
@@ -69,7 +69,7 @@ impl MarkTrack {
         self.foot = self.contour.nearest(beam, before, ahead_mm);
         self.beam = beam;
         self.dose.add(before.at_mm, self.foot.at_mm, energy_j);
-        self.path.add(beam, self.foot.at_mm, 0.5 * self.step_mm);
+        self.path.add(beam, 0.5 * self.step_mm);
         if self.foot.distance_mm > self.worst.0 {
             self.worst = (self.foot.distance_mm, beam);
         }
@@ -78,14 +78,15 @@ impl MarkTrack {
 
     /// How far the light went past the curve's end, mm.
     pub fn past_end_mm(&self) -> f64 {
-        self.contour.past_end_mm(self.beam, self.foot)
+        let foot = self.contour.nearest_to_end(self.beam, self.foot);
+        self.contour.past_end_mm(self.beam, foot)
     }
 
     /// Distances in mm of the curve's points from the lit beam.
     pub fn coverage_mm(&mut self) -> Vec<f64> {
         // The thinned path must still reach to where the light went off.
-        self.path.add(self.beam, self.foot.at_mm, 1e-9);
+        self.path.add(self.beam, 1e-9);
         let n = (self.contour.length_mm() / self.step_mm).ceil() as usize + 1;
-        self.path.distances_mm(&self.contour, self.step_mm, n)
+        std::mem::take(&mut self.path).into_distances_mm(&self.contour, self.step_mm, n)
     }
 }

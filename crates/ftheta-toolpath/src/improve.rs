@@ -8,9 +8,9 @@ use kurbo::Point;
 use std::collections::VecDeque;
 
 /// Neighbours that each end of a node looks at.
-const N_NEIGHBOURS: usize = 7;
+const N_NEIGHBOURS: usize = 10;
 /// Longest part that is reversed or passed over; the cost of a step is proportional to it.
-const SPAN_MAX: usize = 25_000;
+const SPAN_MAX: usize = 100_000;
 /// Most nodes that are moved together.
 const MOVE_MAX: usize = 3;
 /// Gains below this are rounding, mm.

@@ -30,7 +30,7 @@ pub struct LayOptions {
     pub half_field_mm: f64,
     /// Cut marks at the edge of the field instead of refusing them.
     pub clip: bool,
-    /// Places that the search for a short way may look at or move; a second does some 10⁸.
+    /// Places that the search for a short way may look at or move; a second does some 5·10⁸.
     pub moves_budget: u64,
 }
 
@@ -44,14 +44,14 @@ pub enum Order {
 }
 
 impl Default for LayOptions {
-    /// 2 µm, shortest, ±60 mm, no clipping, 100 million places.
+    /// 2 µm, shortest, ±60 mm, no clipping, 500 million places.
     fn default() -> Self {
         Self {
             flatten_tolerance_mm: 0.002,
             order: Order::Shortest,
             half_field_mm: 60.0,
             clip: false,
-            moves_budget: 100_000_000,
+            moves_budget: 500_000_000,
         }
     }
 }
@@ -67,7 +67,7 @@ impl Default for LayOptions {
 /// not finite, a spacing or tolerance too small.
 ///
 /// # Limits
-/// The short way is an improved greedy one, typically 5 % longer than the shortest there is. It is
+/// The short way is an improved greedy one, typically 6 % longer than the shortest there is. It is
 /// never longer than the drawing's own order, unless that marks an outer contour first.
 pub fn lay(job: &Job, options: &LayOptions) -> Result<Imported<Toolpath>, LayError> {
     at_least("flatten_tolerance_mm", options.flatten_tolerance_mm, TOLERANCE_MIN_MM)?;

@@ -69,5 +69,6 @@ fn corner_and_line() {
         jump: travel 28 to 0.000000 0.000000, 1.118034 mm at 4000 mm/s
         jump: hold 18 at 0.000000 0.000000
         jump: hold 146 at 0.000000 0.000000
-    "#]].assert_eq(&dump(&draft));
+    "#]]
+    .assert_eq(&dump(&draft));
 }
