@@ -16,7 +16,8 @@ use thiserror::Error;
 use walk::Walk;
 
 /// This share of the commanded angle and of the mirror's speed stays free for a correction table,
-/// which is applied after the audit. Not quite 3 %: the corners of the presets' fields take up to 97.3 % of the angle.
+/// which is applied after the audit. Not quite 3 %: the corners of the presets' fields take up to
+/// 97.3 % of the angle.
 pub const CORRECTION_RESERVE: f64 = 0.027;
 
 /// Rounding that a ratio of 1 may carry.

@@ -1,9 +1,10 @@
 //! Bars: what the time goes into, how far limits are used, and how the dose is spread.
 
-use crate::report::{LimitPeaks, TimeSplit};
+use crate::report::TimeSplit;
 use crate::score::Score;
 use crate::tally::DOSE_BAR;
 use crate::text::{put, tick, tick_step, ticks, time};
+use ftheta_physics::audit::Limits;
 
 /// A bar of marking, jumping and waiting, with its key.
 pub fn split_html(times: TimeSplit) -> String {
@@ -33,7 +34,7 @@ pub fn split_html(times: TimeSplit) -> String {
 }
 
 /// One bar per limit, red where it is passed.
-pub fn limits_svg(peaks: &LimitPeaks) -> String {
+pub fn limits_svg(peaks: &Limits) -> String {
     let rows = [
         ("angle", peaks.angle),
         ("speed", peaks.speed),

@@ -1,8 +1,9 @@
 //! The figures at the top of the report.
 
-use crate::report::{LimitPeaks, ReportInput};
+use crate::report::ReportInput;
 use crate::score::Score;
 use crate::text::{number, put, time};
+use ftheta_physics::audit::Limits;
 
 /// A figure at the top of the page.
 struct Card {
@@ -75,7 +76,7 @@ fn dose_card(score: &Score) -> Card {
     Card { name: "Dose, 1 to 99 %", value, more, good: None }
 }
 
-fn limits_card(peaks: LimitPeaks) -> Card {
+fn limits_card(peaks: &Limits) -> Card {
     let named = [
         ("angle", peaks.angle),
         ("speed", peaks.speed),

@@ -11,6 +11,7 @@ use base64::prelude::BASE64_STANDARD;
 use ftheta_model::plan::PlanDraft;
 use ftheta_model::trace::AxisStates;
 use ftheta_model::warning::Warning;
+use ftheta_physics::audit::Limits;
 
 /// Largest picture that is put into the page, bytes; keeps the page below some 3 MB.
 const PICTURE_MAX: usize = 1_400_000;
@@ -28,7 +29,7 @@ pub struct ReportInput<'a> {
     /// The twin's seed.
     pub seed: u64,
     /// Peaks over the machine's limits, from the audit.
-    pub peaks: LimitPeaks,
+    pub peaks: &'a Limits,
     /// Figures of the marked field.
     pub score: &'a Score,
     /// What the axes did, in order of time; thinned by the twin or not.
@@ -41,23 +42,6 @@ pub struct ReportInput<'a> {
     pub warnings: &'a [Warning],
     /// The plate picture as PNG, best 1 200 pixels; left out where empty or above 1.4 MB.
     pub plate_png: &'a [u8],
-}
-
-/// Peaks over the whole plan divided by the machine's limits; 1 is at the limit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LimitPeaks {
-    /// Mirror angle.
-    pub angle: f64,
-    /// Mirror speed.
-    pub speed: f64,
-    /// Driver voltage.
-    pub voltage: f64,
-    /// Coil current.
-    pub current: f64,
-    /// Coil heat.
-    pub heat: f64,
-    /// Samples past a limit.
-    pub violations: u64,
 }
 
 /// What a plan's time goes into, s.

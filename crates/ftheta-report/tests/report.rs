@@ -10,8 +10,9 @@ use ftheta_model::recipe::Pen;
 use ftheta_model::space::FieldPoint;
 use ftheta_model::trace::{AxisStates, Light, Trace, TracePoint};
 use ftheta_model::warning::Warning;
+use ftheta_physics::audit::Limits;
 use ftheta_report::plate::{PlateOptions, plate_png};
-use ftheta_report::report::{LimitPeaks, ReportInput, TimeSplit, report_html};
+use ftheta_report::report::{ReportInput, TimeSplit, report_html};
 use ftheta_report::score::score;
 use kurbo::{Affine, BezPath, Circle, ParamCurve, ParamCurveArclen, PathSeg, Point, Rect, Shape};
 
@@ -160,7 +161,7 @@ fn html() -> (String, Vec<u8>) {
         plan: &plan,
         plan_id: "b3f0a1c29d7e",
         seed: 1,
-        peaks: LimitPeaks {
+        peaks: &Limits {
             angle: 0.61,
             speed: 0.42,
             voltage: 0.93,
@@ -214,7 +215,7 @@ fn an_empty_run_still_has_a_report() {
         plan: &plan,
         plan_id: "",
         seed: 0,
-        peaks: LimitPeaks::default(),
+        peaks: &Limits::default(),
         score: &found,
         states: &[],
         times: TimeSplit::default(),

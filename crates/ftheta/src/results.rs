@@ -7,7 +7,7 @@ use ftheta_model::recipe::Interpolation;
 use ftheta_model::warning::Warning;
 use ftheta_planner::classic::Settings;
 use ftheta_report::plate::{PlateOptions, plate_png};
-use ftheta_report::report::{LimitPeaks, ReportInput, TimeSplit, report_html};
+use ftheta_report::report::{ReportInput, TimeSplit, report_html};
 
 /// What the report says of a job beside its figures.
 #[derive(Clone, Copy, Debug)]
@@ -45,21 +45,13 @@ pub fn add(
 }
 
 fn report(marked: &Marked, about: &About<'_>, plate_png: &[u8]) -> String {
-    let limits = marked.plan.limits();
     let times = &marked.times;
     report_html(&ReportInput {
         job_name: about.job_name,
         plan: &marked.plan,
         plan_id: &marked.plan.id().to_string(),
         seed: marked.seed,
-        peaks: LimitPeaks {
-            angle: limits.angle,
-            speed: limits.speed,
-            voltage: limits.voltage,
-            current: limits.current,
-            heat: limits.heat,
-            violations: limits.violations,
-        },
+        peaks: marked.plan.limits(),
         score: &marked.score,
         states: &marked.states,
         times: TimeSplit {
