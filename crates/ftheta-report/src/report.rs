@@ -150,7 +150,7 @@ fn distributions(out: &mut String, input: &ReportInput<'_>) {
              <section><h2>Dose along the marks</h2><p class=note>Line energy over what the pen \
              asks for, in a window of one spot; share of all places.</p>{}</section></div>",
             split_html(input.times),
-            limits_svg(&input.peaks),
+            limits_svg(input.peaks),
             dose_svg(input.score)
         ),
     );

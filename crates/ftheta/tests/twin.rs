@@ -4,7 +4,7 @@
 
 use ftheta::formats::machine::preset;
 use ftheta::model::block::{Block, LaserEdge, SampleSink};
-use ftheta::model::machine::Machine;
+use ftheta::model::machine::{Machine, Sensor};
 use ftheta::model::space::{DacCodes, FieldPoint, MirrorAngles};
 use ftheta::model::trace::Trace;
 use ftheta::physics::axis_loop::AxisLoop;
@@ -58,6 +58,25 @@ fn light_follows_its_edges_by_the_latency() {
     let energy_j = 8.0 * 294_998e-9 + 5.0 * 385_000e-9;
     let found_j = twin.into_dose().total_j();
     assert!((found_j / energy_j - 1.0).abs() < 1e-5, "{found_j} J, {energy_j} J");
+}
+
+/// The servo believes its sensor: with a gain error the beam settles short by just that much, and
+/// drift moves it away from where it was.
+#[test]
+fn sensor_errors_move_the_beam() {
+    let place = |sensor: Sensor| -> FieldPoint {
+        let mut machine = machine();
+        machine.scanner.sensor = sensor;
+        let mut twin = twin(&machine, Mismatch::default());
+        twin.push(&step_block(1000, 20_000)).unwrap();
+        twin.take_trace().points.last().copied().unwrap().into()
+    };
+    let true_place = place(Sensor::default());
+    let gain = place(Sensor { gain_error: 0.01, ..Sensor::default() });
+    assert!((gain.x_mm / true_place.x_mm - 1.0 / 1.01).abs() < 1e-4);
+    let drift = place(Sensor { drift_rad_s: 0.1, ..Sensor::default() });
+    // 10 ms of 0.1 rad/s at 326 mm/rad.
+    assert!((drift.x_mm - true_place.x_mm + 0.326).abs() < 0.02, "{drift:?}");
 }
 
 /// The trace against the axes stepped at 1 µs by another discretisation of the same plant.
