@@ -37,6 +37,7 @@ pub enum Command {
 }
 
 #[derive(Args)]
+#[command(allow_negative_numbers = true)] // so that their range is what is complained of
 #[command(after_help = "\
 Examples:
   ftheta mark panel.svg
@@ -83,7 +84,7 @@ pub struct Mark {
           value_parser = mismatch, allow_hyphen_values = true)]
     pub mismatch: Mismatch,
     /// Noise of the twin's position sensors, µm rms in the field.
-    #[arg(long, value_name = "S", default_value = "0", value_parser = not_negative)]
+    #[arg(long, value_name = "S", default_value = "0", value_parser = noise)]
     pub noise_um: f64,
     /// Folder for report.html, mark.png and plan.ftheta; out/NAME if not given.
     #[arg(long, value_name = "DIR")]
@@ -168,10 +169,13 @@ fn positive(text: &str) -> Result<f64, String> {
     })
 }
 
-fn not_negative(text: &str) -> Result<f64, String> {
-    number(text).and_then(|value| {
-        if value >= 0.0 { Ok(value) } else { Err(format!("{value} is less than 0")) }
-    })
+fn noise(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if (0.0..=1e4).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is outside 0 to 10000"))
+    }
 }
 
 fn number(text: &str) -> Result<f64, String> {

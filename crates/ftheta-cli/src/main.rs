@@ -9,6 +9,8 @@ mod screen;
 use crate::screen::note;
 use arguments::{Arguments, Command};
 use clap::Parser;
+use ftheta::Error;
+use ftheta::toolpath::error::LayError;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -32,6 +34,9 @@ fn main() -> ExitCode {
                 json::print(&json::fault(&fault));
             } else {
                 note!("error: {}", fault.message);
+                if let Error::Lay(LayError::OutsideField { .. }) = error {
+                    note!("hint: --clip marks what fits, --fit MM scales the page");
+                }
             }
             ExitCode::FAILURE
         }

@@ -137,6 +137,9 @@ pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
     if last != "end" {
         return Err(lines.error("the last line, \"end\"", last));
     }
+    if let Some(more) = lines.lines.next() {
+        return Err(lines.error("nothing after the last line", more));
+    }
     Ok((draft, id))
 }
 

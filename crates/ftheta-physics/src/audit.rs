@@ -10,6 +10,7 @@ use crate::axis_loop::AxisLoop;
 use crate::galvo::{CURRENT, Galvo};
 use crate::optics::angles_from_field;
 use crate::servo::{Gains, ServoError};
+use ftheta_model::machine::Machine;
 use ftheta_model::plan::PlanDraft;
 use ftheta_model::space::FieldPoint;
 use thiserror::Error;
@@ -30,13 +31,13 @@ pub struct Limits {
     pub angle: f64,
     /// Mirror speed.
     pub speed: f64,
-    /// Driver voltage.
+    /// Voltage that the servo asks of the driver, before the driver clips it.
     pub voltage: f64,
-    /// Coil current.
+    /// Coil current that this voltage leads to, before the driver limits it.
     pub current: f64,
     /// Heat of the coil: filtered square of the current by the square of the rms limit.
     pub heat: f64,
-    /// Samples past a limit.
+    /// Samples past a limit; none in a plan, since the first one refuses it.
     pub violations: u64,
 }
 
@@ -63,7 +64,7 @@ pub enum AuditError {
         y_mm: f64,
     },
     /// A limit of the motors is passed.
-    #[error("{place}: {quantity} {value:.4} {unit} exceeds the limit {limit:.4} {unit}")]
+    #[error("{place}: {quantity} {value} {unit} exceeds the limit {limit} {unit}")]
     Limit {
         /// Sample and mark.
         place: String,
@@ -122,7 +123,7 @@ impl AuditError {
             Self::Power { place, value_w, limit_w } => {
                 (place.clone(), format!("{value_w} W"), format!("{limit_w} W"))
             }
-            Self::Servo(error) => ("scanner.servo".into(), error.to_string(), String::new()),
+            Self::Servo(error) => error.fault(),
         }
     }
 }
@@ -186,7 +187,8 @@ impl Meter {
         let commanded = commanded_rad / scanner.angle_max_rad;
         let mut now = Limits { angle: commanded, ..Limits::default() };
         for (axis, command) in [angles.x_rad, angles.y_rad].into_iter().enumerate() {
-            let voltage_v = self.axes[axis].tick(command, 0.0);
+            let (demand_v, demand_a) = self.axes[axis].demand();
+            self.axes[axis].tick(command, 0.0);
             let state = self.axes[axis].state();
             let current_a = state[CURRENT];
             let heat = &mut self.heat_a2[axis];
@@ -195,8 +197,8 @@ impl Meter {
             now.angle = now.angle.max(angle_rad / scanner.angle_max_rad);
             let speed_rad_s = self.speed_row.dot(state).abs();
             now.speed = now.speed.max(speed_rad_s / scanner.speed_max_rad_s);
-            now.voltage = now.voltage.max(voltage_v.abs() / scanner.voltage_max_v);
-            now.current = now.current.max(current_a.abs() / scanner.current_max_a);
+            now.voltage = now.voltage.max(demand_v.abs() / scanner.voltage_max_v);
+            now.current = now.current.max(demand_a.abs() / scanner.current_max_a);
             now.heat = now.heat.max(*heat / (scanner.current_rms_a * scanner.current_rms_a));
         }
         refuse(draft, commanded, &now, where_)?;
@@ -227,7 +229,10 @@ fn refuse(
 ) -> Result<(), AuditError> {
     let scanner = &draft.machine.scanner;
     let free = 1.0 - CORRECTION_RESERVE;
+    let word_range_rad = draft.machine.output.word_range_rad;
+    let word = commanded * scanner.angle_max_rad / word_range_rad;
     let rows = [
+        (word, 1.0, "commanded angle (output word)", word_range_rad.to_degrees(), "deg"),
         (commanded, free, "commanded angle", scanner.angle_max_rad.to_degrees(), "deg"),
         (now.angle, 1.0, "mirror angle", scanner.angle_max_rad.to_degrees(), "deg"),
         (now.speed, free, "mirror speed", scanner.speed_max_rad_s, "rad/s"),
@@ -237,8 +242,45 @@ fn refuse(
     ];
     for (ratio, share, quantity, limit, unit) in rows {
         if ratio.is_nan() || ratio > share + ROUNDING {
-            let (value, limit) = (ratio * limit, share * limit);
+            let (value, limit) = (six_digits(ratio * limit), six_digits(share * limit));
             return Err(AuditError::Limit { place: place(), quantity, value, limit, unit });
+        }
+    }
+    Ok(())
+}
+
+/// A number as it is best read, without the noise of its last bits.
+fn six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// Checks that the whole field of a machine can be commanded: reached by the optics, within the
+/// angle that plans may use, and within the output word.
+///
+/// # Errors
+/// The first place on the field's edge that cannot.
+pub fn check_field(machine: &Machine) -> Result<(), AuditError> {
+    const N_STEPS: i32 = 64;
+    let half_mm = 0.5 * machine.optics.field_mm;
+    let free_rad = (1.0 - CORRECTION_RESERVE) * machine.scanner.angle_max_rad;
+    let limit_rad = free_rad.min(machine.output.word_range_rad);
+    for step in -N_STEPS..=N_STEPS {
+        let along_mm = half_mm * f64::from(step) / f64::from(N_STEPS);
+        for place in [FieldPoint::new(along_mm, half_mm), FieldPoint::new(half_mm, along_mm)] {
+            let (x_mm, y_mm) = (place.x_mm, place.y_mm);
+            let named = || format!("edge of the field at ({x_mm:.3}, {y_mm:.3}) mm");
+            let angles = angles_from_field(&machine.optics, place)
+                .ok_or_else(|| AuditError::Unreachable { place: named(), x_mm, y_mm })?;
+            let commanded_rad = angles.x_rad.abs().max(angles.y_rad.abs());
+            if commanded_rad > limit_rad {
+                return Err(AuditError::Limit {
+                    place: named(),
+                    quantity: "commanded angle",
+                    value: six_digits(commanded_rad.to_degrees()),
+                    limit: six_digits(limit_rad.to_degrees()),
+                    unit: "deg",
+                });
+            }
         }
     }
     Ok(())

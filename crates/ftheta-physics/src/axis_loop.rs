@@ -72,6 +72,15 @@ impl AxisLoop {
         acting_v
     }
 
+    /// Voltage (V) that the servo asks of the driver for the coming tick, and the current (A) that it
+    /// would end with: beyond a limit the driver clips, and the loop is no longer the one designed.
+    #[inline]
+    pub fn demand(&self) -> (f64, f64) {
+        let voltage_v = self.pending_v.clamp(-self.voltage_max_v, self.voltage_max_v);
+        let current_a = self.current_row.dot(&self.state) + self.step.b[CURRENT] * voltage_v;
+        (self.pending_v, current_a)
+    }
+
     /// What the driver makes of a voltage: within the supply, and not so much that the current
     /// leaves its limit by the end of the tick.
     #[inline]

@@ -31,6 +31,22 @@ pub enum ServoError {
     },
 }
 
+impl ServoError {
+    /// Place, value and limit for a machine-readable message.
+    pub fn fault(&self) -> (String, String, String) {
+        match self {
+            Self::Lag { lag_us, low_us, high_us } => (
+                "scanner.servo.lag_us".into(),
+                format!("{lag_us:.1} µs"),
+                format!("{low_us:.1} to {high_us:.1} µs"),
+            ),
+            Self::Unstable { radius } => {
+                ("scanner.servo".into(), format!("{radius:.4} per tick"), "1 per tick".into())
+            }
+        }
+    }
+}
+
 /// Gains of a servo, computed once for the nominal axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gains {

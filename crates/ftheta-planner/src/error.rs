@@ -93,7 +93,7 @@ impl PlanError {
                 format!("on {on_us} µs, off {off_us} µs"),
                 "0 <= on <= off".into(),
             ),
-            Self::Servo(error) => ("scanner.servo".into(), error.to_string(), String::new()),
+            Self::Servo(error) => error.fault(),
             Self::Audit(error) => error.fault(),
         }
     }

@@ -131,8 +131,12 @@ impl Tally {
         for end_mm in [track.before_start_mm, track.past_end_mm()] {
             self.end_um.add(1e3 * end_mm.abs(), 1.0);
         }
-        for distance_mm in track.coverage_mm() {
-            self.coverage_um.add(1e3 * distance_mm, 1.0);
+        // Both ends are sampled, so each stands for half a step: weights follow arc length.
+        let distances_mm = track.coverage_mm();
+        let last = distances_mm.len() - 1;
+        for (index, distance_mm) in distances_mm.into_iter().enumerate() {
+            let weight = if index == 0 || index == last { 0.5 } else { 1.0 };
+            self.coverage_um.add(1e3 * distance_mm, weight);
         }
         for line_j_mm in track.dose.windows_j_mm() {
             let ratio = line_j_mm / track.asked_j_mm;

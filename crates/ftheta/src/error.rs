@@ -9,7 +9,7 @@ use ftheta_planner::PlanError;
 use ftheta_toolpath::error::LayError;
 use ftheta_twin::twin::TwinError;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Everything that can go wrong between a file and a marked field.
@@ -132,12 +132,12 @@ impl Error {
             }
             Self::Svg { path, source } => {
                 let (place, value, limit) = source.fault();
-                (format!("{}: {place}", path.display()), value, limit)
+                (named(path, &place), value, limit)
             }
             Self::Toml(error) => error.fault(),
             Self::PlanFile { path, source } => {
                 let (place, value, limit) = source.fault();
-                (format!("{}: {place}", path.display()), value, limit)
+                (named(path, &place), value, limit)
             }
             Self::PlanId { path, found, claimed } => {
                 (path.display().to_string(), found.clone(), claimed.clone())
@@ -145,10 +145,16 @@ impl Error {
             Self::Lay(error) => error.fault(),
             Self::Plan(error) => error.fault(),
             Self::Audit(error) => error.fault(),
-            Self::Servo(error) => ("scanner.servo".into(), error.to_string(), String::new()),
+            Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),
             Self::Picture(message) => ("mark.png".into(), message.clone(), String::new()),
         };
         Fault { message: self.to_string(), place, value, limit }
     }
+}
+
+/// A place in a file, or the file alone.
+fn named(path: &Path, place: &str) -> String {
+    let path = path.display();
+    if place.is_empty() { path.to_string() } else { format!("{path}: {place}") }
 }

@@ -133,7 +133,7 @@ pub fn mark(
         clip: options.clip,
         ..LayOptions::default()
     };
-    let Imported { value: mut toolpath, warnings } = lay(job, &lay_options)?;
+    let Imported { value: mut toolpath, mut warnings } = lay(job, &lay_options)?;
     if let Some(speed_mm_s) = options.speed_mm_s {
         toolpath.pens.iter_mut().for_each(|pen| pen.mark_speed_mm_s = speed_mm_s);
     }
@@ -143,9 +143,32 @@ pub fn mark(
     observer(Stage::Audit);
     let plan = Plan::new(draft)?;
     let Played { score, dose, states } = play(&plan, options, observer)?;
+    warnings.extend(shortcomings(&plan, &score));
     let times = plan_times(&plan);
     let seed = options.seed;
     Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
+}
+
+/// Stray energy from which on it is worth a warning.
+const STRAY_WARNING: f64 = 0.01;
+
+/// What a user has to know of a result before relying on it.
+fn shortcomings(plan: &PlanDraft, score: &Score) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let mut warn = |message: String| warnings.push(Warning::new("result", message));
+    let (error_um, tolerance_um) = (score.contour_error_um.max, plan.tolerance_mm * 1e3);
+    if error_um > tolerance_um {
+        warn(format!("contour error {error_um:.1} µm exceeds the tolerance of {tolerance_um} µm"));
+    }
+    if score.stray_energy_ratio > STRAY_WARNING {
+        let percent = score.stray_energy_ratio * 100.0;
+        warn(format!("{percent:.1} % of the energy falls farther off its mark than the tolerance"));
+    }
+    let dark = |index: usize| plan.marks.iter().any(|m| m.pen_index == index && m.power_w == 0.0);
+    for (_, pen) in plan.pens.iter().enumerate().filter(|&(index, _)| dark(index)) {
+        warn(format!("pen \"{}\" has no power, so its marks see no light", pen.name));
+    }
+    warnings
 }
 
 /// What the twin did with a plan.

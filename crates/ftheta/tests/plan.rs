@@ -87,9 +87,23 @@ fn audit_refuses_what_the_motors_cannot() {
         draft.machine.optics.lens = lens;
         draft.machine.scanner.angle_max_rad = 0.8;
         draft.machine.scanner.speed_max_rad_s = 1e6;
-        draft.machine.scanner.current_rms_a = 100.0;
+        draft.machine.scanner.voltage_max_v = 1e6;
+        draft.machine.scanner.current_max_a = 1e6;
+        draft.machine.scanner.current_rms_a = 1e6;
+        draft.machine.output.word_range_rad = 1.0;
     });
     assert!(matches!(far, AuditError::Unreachable { .. }), "{far}");
+}
+
+/// A driver that clips is not the loop that was designed: the demand counts, not what is left.
+#[test]
+fn audit_refuses_saturation_and_words_out_of_range() {
+    let error = refusal(|draft| draft.machine.scanner.voltage_max_v = 1.0);
+    assert!(matches!(error, AuditError::Limit { quantity: "driver voltage", .. }), "{error}");
+    let error = refusal(|draft| draft.machine.scanner.current_max_a = 0.2);
+    assert!(matches!(error, AuditError::Limit { quantity: "coil current", .. }), "{error}");
+    let error = refusal(|draft| draft.machine.output.word_range_rad = 0.02);
+    assert!(error.to_string().contains("output word"), "{error}");
 }
 
 #[test]

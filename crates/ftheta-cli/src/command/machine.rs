@@ -5,6 +5,7 @@ use crate::json;
 use crate::screen::say;
 use ftheta::formats::machine::{PRESETS, preset};
 use ftheta::model::machine::{Lens, Machine as MachineFile};
+use ftheta::physics::audit::check_field;
 use ftheta::physics::galvo::Galvo;
 use ftheta::physics::laser::rayleigh_range_mm;
 use ftheta::physics::optics::scale_mm_per_rad;
@@ -77,6 +78,7 @@ fn show(name: &str, as_json: bool) -> Result<(), Error> {
 /// What follows from a machine file and is worth comparing with a data sheet.
 fn check(name: &str, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(name)?;
+    check_field(&machine)?;
     let scanner = &machine.scanner;
     let galvo = Galvo::new(scanner);
     let gains = Gains::design(scanner, machine.output.period_s())?;

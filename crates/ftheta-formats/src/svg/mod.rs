@@ -127,7 +127,11 @@ pub fn read(
         reader.warnings.add("<svg>", surprise);
     }
     if reader.marking.is_empty() {
-        return Err(SvgError::NothingToMark { reason: reader.tally.reason() });
+        let mut reason = reader.tally.reason();
+        if let Some(warning) = reader.warnings.into_vec().first() {
+            reason.push_str(&format!("; {warning}"));
+        }
+        return Err(SvgError::NothingToMark { reason });
     }
     Ok(Imported {
         value: reader.marking.into_job(page.size_mm),

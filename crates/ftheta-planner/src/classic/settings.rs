@@ -57,12 +57,18 @@ impl Settings {
         let gains = Gains::design(scanner, machine.output.period_s())?;
         let lag_s = gains.lag_s(&Galvo::new(scanner));
         let lag_ns = (lag_s * 1e9).round() as i64;
+        let fastest_mm_s = fastest_mm_s(machine);
+        // Where light is slow to come, the next on edge is early: it must not meet the last off.
+        let light_gap_s = machine.output.period_s()
+            + (machine.laser.on_latency_ns - machine.laser.off_latency_ns) as f64 * 1e-9;
         Ok(Self {
-            jump_speed_mm_s: recipe.jump_speed_mm_s.unwrap_or(JUMP_SPEED_MM_S),
+            jump_speed_mm_s: recipe
+                .jump_speed_mm_s
+                .unwrap_or(JUMP_SPEED_MM_S.min(0.9 * fastest_mm_s)),
             jump_delay_min_s: recipe.jump_delay_min_s.unwrap_or(lag_s),
             jump_delay_s: recipe.jump_delay_s.unwrap_or(2.0 * lag_s),
             jump_length_limit_mm: recipe.jump_length_limit_mm.unwrap_or(JUMP_LENGTH_LIMIT_MM),
-            mark_delay_s: recipe.mark_delay_s.unwrap_or(lag_s),
+            mark_delay_s: recipe.mark_delay_s.unwrap_or(lag_s.max(light_gap_s)),
             polygon_delay_s: recipe.polygon_delay_s.unwrap_or(lag_s),
             laser_on_delay_ns: recipe
                 .laser_on_delay_ns
@@ -101,7 +107,7 @@ impl Settings {
 
     /// Checks every value against what the machine and good sense allow.
     pub(super) fn check(&self, machine: &Machine) -> Result<(), PlanError> {
-        let fastest_mm_s = machine.scanner.speed_max_rad_s * scale_mm_per_rad(&machine.optics);
+        let fastest_mm_s = fastest_mm_s(machine);
         let nanosecond = 1e-9;
         let rows = [
             ("jump_speed", self.jump_speed_mm_s, 1e-3, fastest_mm_s, "mm/s"),
@@ -134,11 +140,16 @@ impl Settings {
     }
 }
 
+/// Speed of the beam in the field's centre at the mirrors' greatest speed, whole mm/s.
+fn fastest_mm_s(machine: &Machine) -> f64 {
+    (machine.scanner.speed_max_rad_s * scale_mm_per_rad(&machine.optics)).floor()
+}
+
 /// Checks a pen's speed and power against the machine.
 pub(super) fn check_pen(pen: &Pen, machine: &Machine) -> Result<(), PlanError> {
     let place = format!("pen \"{}\"", pen.name);
-    let fastest_mm_s = machine.scanner.speed_max_rad_s * scale_mm_per_rad(&machine.optics);
-    check_range(&place, "mark_speed", pen.mark_speed_mm_s, (1e-3, fastest_mm_s), "mm/s")?;
+    let range = (1e-3, fastest_mm_s(machine));
+    check_range(&place, "mark_speed", pen.mark_speed_mm_s, range, "mm/s")?;
     check_range(&place, "power", pen.power_w, (0.0, machine.laser.power_max_w), "W")
 }
 
