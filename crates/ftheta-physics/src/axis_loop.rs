@@ -72,8 +72,8 @@ impl AxisLoop {
         acting_v
     }
 
-    /// Voltage (V) that the servo asks of the driver for the coming tick, and the current (A) that it
-    /// would end with: beyond a limit the driver clips, and the loop is no longer the one designed.
+    /// Voltage (V) that the servo asks of the driver for the coming tick, and the current (A) that
+    /// it would end with: beyond a limit the driver clips, and the loop is not the designed one.
     #[inline]
     pub fn demand(&self) -> (f64, f64) {
         let voltage_v = self.pending_v.clamp(-self.voltage_max_v, self.voltage_max_v);
