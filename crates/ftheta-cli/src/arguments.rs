@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use ftheta::jump::Law;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
 use std::path::PathBuf;
@@ -24,6 +25,8 @@ pub enum Command {
     Mark(Box<Mark>),
     /// Audit a plan file again: its id, its limits, its light.
     Verify(Verify),
+    /// Show how fast a machine can jump, and how near each law comes to that on the twin.
+    Jump(Jump),
     /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv).
     Convert(Convert),
     /// List, show and check machines.
@@ -96,6 +99,58 @@ pub struct Mark {
 pub struct Verify {
     /// Plan file, as `ftheta mark` writes it.
     pub plan: PathBuf,
+}
+
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  ftheta jump --machine S10 --step-deg 0.1,1,5
+  ftheta jump --machine S14 --step-deg 1 --law robust --mismatch f1=-0.03 --reserve 0")]
+pub struct Jump {
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Steps, degrees mechanical.
+    #[arg(long, value_name = "D[,D...]", required = true, value_delimiter = ',',
+          value_parser = positive)]
+    pub step_deg: Vec<f64>,
+    /// Motion laws to compare.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "all")]
+    pub law: Vec<LawName>,
+    /// The mirror has arrived when it stays this near to the target, degrees.
+    #[arg(long, value_name = "E", default_value = "0.002", value_parser = positive)]
+    pub tolerance_deg: f64,
+    /// Part of the voltage kept for the servo's feedback, 0 to 0.9.
+    #[arg(long, value_name = "R", default_value = "0.12", value_parser = reserve)]
+    pub reserve: f64,
+    /// Period of the voltage, µs, instead of the machine's.
+    #[arg(long, value_name = "P", value_parser = period)]
+    pub period_us: Option<f64>,
+    /// Errors of the twin's plant that the law does not know of, as in f1=+0.03,kt=-0.02.
+    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
+          value_parser = mismatch, allow_hyphen_values = true)]
+    pub mismatch: Mismatch,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum LawName {
+    /// Fewest ticks on the nominal axis.
+    Optimal,
+    /// Fewest ticks that stand the machine's uncertainty, for a driver that controls current.
+    Robust,
+    /// Every law.
+    All,
+}
+
+impl LawName {
+    /// The laws of this name.
+    pub fn laws(self) -> &'static [Law] {
+        match self {
+            Self::Optimal => &[Law::Optimal],
+            Self::Robust => &[Law::Robust],
+            Self::All => &Law::ALL,
+        }
+    }
 }
 
 #[derive(Args)]
@@ -175,6 +230,24 @@ fn noise(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!("{value} is outside 0 to 10000"))
+    }
+}
+
+fn reserve(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if (0.0..=0.9).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is outside 0 to 0.9"))
+    }
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if (1.0..=100.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is outside 1 to 100"))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The commands: each reads its arguments, calls the library, prints.
 
 pub mod convert;
+pub mod jump;
 pub mod machine;
 pub mod mark;
 pub mod verify;

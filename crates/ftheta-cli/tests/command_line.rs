@@ -236,6 +236,31 @@ fn usage_errors_exit_with_two() {
     assert_eq!(bench.run(&["mark", "--help"]).status.code(), Some(0));
 }
 
+/// Limits are those of the reference table (`design/control.md` B), and the optimal law arrives
+/// within a tick of the limit, at rest.
+#[test]
+fn jump_compares_laws_with_the_limit() {
+    let bench = Bench::new();
+    let (code, value) =
+        bench.json(&["jump", "--machine", "S10", "--step-deg", "0.1,1", "--reserve", "0"]);
+    assert_eq!(code, 0);
+    for (index, limit_us, rigid_us) in [(0, 211.6, 144.7), (1, 342.4, 328.6)] {
+        let step = &value["steps"][index];
+        assert!((number(step, &["limit_s"]) * 1e6 / limit_us - 1.0).abs() < 1e-3, "{step}");
+        assert!((number(step, &["limit_rigid_s"]) * 1e6 / rigid_us - 1.0).abs() < 1e-3);
+        let optimal = &step["laws"][0];
+        assert_eq!(optimal["law"], "optimal");
+        assert_eq!(number(optimal, &["settle_s"]), 0.0);
+        assert!(number(optimal, &["total_s"]) < number(step, &["limit_s"]) + 1e-5);
+        for key in ["plan_s", "ratio", "peak_voltage_ratio", "residual_deg", "heat_a2s"] {
+            number(optimal, &[key]);
+        }
+        assert!(number(optimal, &["peak_current_ratio"]) <= 1.0);
+    }
+    bench.fault(&["jump", "--machine", "S10", "--step-deg", "30"]);
+    assert_eq!(bench.run(&["jump", "--step-deg", "x"]).status.code(), Some(2));
+}
+
 #[test]
 fn machines_are_listed_shown_and_checked() {
     let bench = Bench::new();

@@ -4,6 +4,7 @@
 
 pub mod classic;
 mod error;
+pub mod jump;
 pub mod render;
 
 pub use error::PlanError;

@@ -6,4 +6,5 @@ mod beam;
 mod exposure;
 mod light;
 pub mod mismatch;
+pub mod open_loop;
 pub mod twin;

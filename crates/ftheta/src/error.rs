@@ -6,6 +6,7 @@ use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
 use ftheta_physics::servo::ServoError;
 use ftheta_planner::PlanError;
+use ftheta_planner::jump::JumpError;
 use ftheta_toolpath::error::LayError;
 use ftheta_twin::twin::TwinError;
 use std::io;
@@ -87,6 +88,9 @@ pub enum Error {
     /// The toolpath cannot be planned.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// A jump cannot be planned.
+    #[error(transparent)]
+    Jump(#[from] JumpError),
     /// The plan is refused.
     #[error(transparent)]
     Audit(#[from] AuditError),
@@ -144,6 +148,10 @@ impl Error {
             }
             Self::Lay(error) => error.fault(),
             Self::Plan(error) => error.fault(),
+            Self::Jump(JumpError::Parameter { quantity, value, low, high }) => {
+                ((*quantity).into(), value.to_string(), format!("{low} to {high}"))
+            }
+            Self::Jump(error) => ("jump".into(), error.to_string(), String::new()),
             Self::Audit(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),

@@ -6,6 +6,7 @@
 pub mod convert;
 pub mod error;
 pub mod import;
+pub mod jump;
 pub mod machines;
 pub mod mark;
 pub mod output;
