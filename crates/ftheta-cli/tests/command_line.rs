@@ -156,6 +156,8 @@ fn faulty_drawings_are_errors_without_output() {
         bench.fault(&["mark", &file, "--out", "nowhere"]);
         assert!(!bench.path("nowhere").join("plan.ftheta").exists(), "{name}");
     }
+    let error = bench.fault(&["mark", "huge.svg"]);
+    assert!(error["message"].as_str().unwrap().contains("<path> on line 1"), "{error}");
     bench.fault(&["mark", "missing.svg"]);
     bench.fault(&["mark", "."]);
 }

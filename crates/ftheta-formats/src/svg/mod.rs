@@ -128,7 +128,8 @@ pub fn read(
     }
     if reader.marking.is_empty() {
         let mut reason = reader.tally.reason();
-        if let Some(warning) = reader.warnings.into_vec().first() {
+        let faults = reader.tally.n_dropped > 0;
+        if let Some(warning) = reader.warnings.into_vec().first().filter(|_| faults) {
             reason.push_str(&format!("; {warning}"));
         }
         return Err(SvgError::NothingToMark { reason });
