@@ -5,6 +5,7 @@ use clap_complete::Shell;
 use ftheta::jump::Law;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// Open software that moves laser beams with galvanometer mirrors.
@@ -225,30 +226,22 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn noise(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if (0.0..=1e4).contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!("{value} is outside 0 to 10000"))
-    }
+    within(number(text)?, 0.0..=1e4)
 }
 
 fn reserve(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if (0.0..=0.9).contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!("{value} is outside 0 to 0.9"))
-    }
+    within(number(text)?, 0.0..=0.9)
 }
 
 fn period(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if (1.0..=100.0).contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!("{value} is outside 1 to 100"))
+    within(number(text)?, 1.0..=100.0)
+}
+
+fn within(value: f64, range: RangeInclusive<f64>) -> Result<f64, String> {
+    if range.contains(&value) {
+        return Ok(value);
     }
+    Err(format!("{value} is outside {} to {}", range.start(), range.end()))
 }
 
 fn number(text: &str) -> Result<f64, String> {
@@ -264,19 +257,13 @@ fn mismatch(text: &str) -> Result<Mismatch, String> {
             .split_once('=')
             .ok_or_else(|| format!("\"{part}\" is not of the form key=value"))?;
         let value = number(value)?;
-        let (slot_range, key) = match key.trim() {
-            key @ ("f1" | "kt") => (-0.5..=0.5, key),
-            key @ "zeta" => (1e-5..=0.5, key),
-            other => return Err(format!("unknown key \"{other}\", known are f1, kt, zeta")),
-        };
-        if !slot_range.contains(&value) {
-            let (low, high) = slot_range.into_inner();
-            return Err(format!("{key} = {value} is outside {low} to {high}"));
-        }
+        let key = key.trim();
+        let named = |message: String| format!("{key} = {message}");
         match key {
-            "f1" => mismatch.f1 = value,
-            "kt" => mismatch.kt = value,
-            _ => mismatch.zeta = Some(value),
+            "f1" => mismatch.f1 = within(value, -0.5..=0.5).map_err(named)?,
+            "kt" => mismatch.kt = within(value, -0.5..=0.5).map_err(named)?,
+            "zeta" => mismatch.zeta = Some(within(value, 1e-5..=0.5).map_err(named)?),
+            other => return Err(format!("unknown key \"{other}\", known are f1, kt, zeta")),
         }
     }
     Ok(mismatch)

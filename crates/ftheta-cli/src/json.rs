@@ -3,7 +3,6 @@
 use crate::screen::say;
 use ftheta::Fault;
 use ftheta::mark::{Marked, PlanTimes};
-use ftheta::model::plan::Planner;
 use ftheta::model::warning::Warning;
 use ftheta::physics::audit::Limits;
 use ftheta::physics::plan::Plan;
@@ -55,12 +54,9 @@ pub fn marked(
 
 /// Figures of a plan, without the time that planning took.
 pub fn plan(plan: &Plan, times: &PlanTimes) -> Value {
-    let planner = match plan.planner {
-        Planner::Classic => "classic",
-    };
     json!({
         "id": plan.id().to_string(),
-        "planner": planner,
+        "planner": plan.planner.name(),
         "machine": plan.machine.name,
         "period_us": f64::from(plan.machine.output.period_ns) * 1e-3,
         "samples": plan.n_samples(),

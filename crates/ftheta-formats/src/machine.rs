@@ -7,6 +7,7 @@ use crate::toml_table::{Section, TomlError, parse};
 use ftheta_model::machine::{
     Axis, Drive, Laser, Lens, Machine, Optics, Output, Scanner, Sensor, Servo,
 };
+use ftheta_physics::laser::spot_diameter_mm;
 pub use preset::{PRESETS, preset, preset_text};
 use std::f64::consts::PI;
 pub use write::to_toml;
@@ -124,8 +125,7 @@ fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
         }
     };
     // The diffraction limit; a measured spot overrides it.
-    let limit_mm =
-        4.0 * beam_quality_m2 * wavelength_nm * 1e-6 * focal_mm / (PI * beam_diameter_mm);
+    let limit_mm = spot_diameter_mm(wavelength_nm, beam_quality_m2, focal_mm, beam_diameter_mm);
     let spot_um = section.number("spot_diameter_um", 0.5..=1e4)?;
     Ok(Laser {
         wavelength_nm,

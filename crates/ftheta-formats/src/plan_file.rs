@@ -49,8 +49,8 @@ impl PlanFileError {
 /// Only those of `out`.
 pub fn write(draft: &PlanDraft, id: &str, out: &mut impl Write) -> io::Result<()> {
     let machine = machine::to_toml(&draft.machine);
-    let Planner::Classic = draft.planner;
-    writeln!(out, "{HEADER}\nid {id}\nplanner classic\ntolerance_mm {}", draft.tolerance_mm)?;
+    let planner = draft.planner.name();
+    writeln!(out, "{HEADER}\nid {id}\nplanner {planner}\ntolerance_mm {}", draft.tolerance_mm)?;
     writeln!(out, "machine {}\n{machine}", machine.lines().count())?;
     writeln!(out, "pens {}", draft.pens.len())?;
     for pen in &draft.pens {

@@ -5,6 +5,7 @@
 
 pub mod block;
 pub mod dose;
+pub mod flatten;
 pub mod job;
 pub mod machine;
 pub mod plan;

@@ -30,6 +30,15 @@ pub enum Planner {
     Classic,
 }
 
+impl Planner {
+    /// Its name in files, reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Classic => "classic",
+        }
+    }
+}
+
 /// A mark and its light.
 #[derive(Clone, Debug)]
 pub struct PlannedMark {

@@ -135,9 +135,11 @@ impl AuditError {
 /// (see [`CORRECTION_RESERVE`]).
 pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
     walk::check_structure(draft)?;
-    light::check_light(draft)?;
+    let scanner = &draft.machine.scanner;
+    let gains = Gains::design(scanner, draft.machine.output.period_s())?;
+    light::check_light(draft, gains.lag_s(&Galvo::new(scanner)))?;
     let mut walk = Walk::new(draft);
-    let mut meter = Meter::new(draft)?;
+    let mut meter = Meter::new(draft, gains);
     while let Some((place, segment_index)) = walk.next() {
         meter.sample(draft, place, segment_index)?;
     }
@@ -156,12 +158,12 @@ struct Meter {
 }
 
 impl Meter {
-    fn new(draft: &PlanDraft) -> Result<Self, ServoError> {
+    fn new(draft: &PlanDraft, gains: Gains) -> Self {
         let scanner = &draft.machine.scanner;
         let tick_s = draft.machine.output.period_s();
         let plant = Galvo::new(scanner);
-        let axis = AxisLoop::new(&plant, Gains::design(scanner, tick_s)?, scanner, tick_s);
-        Ok(Self {
+        let axis = AxisLoop::new(&plant, gains, scanner, tick_s);
+        Self {
             axes: [axis.clone(), axis],
             heat_a2: [0.0; 2],
             heat_decay: (-tick_s / scanner.thermal_time_s).exp(),
@@ -169,7 +171,7 @@ impl Meter {
             speed_row: plant.mirror_speed_row(),
             n_samples: 0,
             limits: Limits::default(),
-        })
+        }
     }
 
     fn sample(

@@ -1,6 +1,7 @@
 //! A mark's exact curve as a very fine polyline that finds the nearest of its points.
 
-use kurbo::{BezPath, ParamCurve, PathSeg, Point, Rect, Vec2};
+use ftheta_model::flatten::flatten;
+use kurbo::{BezPath, Point, Rect, Vec2};
 
 /// Greatest distance of the polyline from the curve, mm.
 const FLATTEN_MM: f64 = 2e-5;
@@ -286,29 +287,13 @@ fn flattened(curve: &BezPath) -> Vec<Point> {
         Some(last) if last.distance(p) < 1e-9 => {}
         _ => points.push(p),
     };
-    for segment in curve.segments() {
-        // Steps of equal parameter h are off by at most h²/8 of the second derivative.
-        let bend_mm = match segment {
-            PathSeg::Line(_) => 0.0,
-            PathSeg::Quad(q) => 2.0 * bend(q.p0, q.p1, q.p2),
-            PathSeg::Cubic(c) => 6.0 * bend(c.p0, c.p1, c.p2).max(bend(c.p1, c.p2, c.p3)),
-        };
-        let n_steps = (bend_mm / (8.0 * FLATTEN_MM)).sqrt().ceil().max(1.0);
-        add(segment.start());
-        for step in 1..=n_steps as usize {
-            add(segment.eval(step as f64 / n_steps));
-        }
-    }
+    flatten(curve, FLATTEN_MM, &mut add);
     // A curve that is a single place still has a direction.
     let at = points.last().copied().unwrap_or_default();
     while points.len() < 2 {
         points.push(at + Vec2::new(1e-9 * points.len() as f64, 0.0));
     }
     points
-}
-
-fn bend(a: Point, b: Point, c: Point) -> f64 {
-    (a.to_vec2() - 2.0 * b.to_vec2() + c.to_vec2()).hypot()
 }
 
 fn distance_sq(area: Rect, p: Point) -> f64 {

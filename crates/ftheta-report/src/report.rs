@@ -87,7 +87,7 @@ pub fn report_html(input: &ReportInput<'_>) -> String {
 
 fn header(out: &mut String, input: &ReportInput<'_>, title: &str) {
     let plan = input.plan;
-    let planner = format!("{:?}", plan.planner).to_lowercase();
+    let planner = plan.planner.name().to_owned();
     let tolerance = format!("{} µm", number(1e3 * plan.tolerance_mm));
     let facts = [
         ("Machine", escaped(&plan.machine.name)),

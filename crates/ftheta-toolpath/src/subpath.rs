@@ -1,6 +1,7 @@
 //! A path taken apart into single curves, and curves flattened.
 
-use kurbo::{BezPath, ParamCurve, PathEl, PathSeg, Point};
+use ftheta_model::flatten::flatten;
+use kurbo::{BezPath, PathEl, Point};
 
 /// Points nearer than this are one point, mm: a nanometre is nothing to a laser.
 pub const SAME_PLACE_MM: f64 = 1e-6;
@@ -47,30 +48,13 @@ pub fn subpaths(path: &BezPath, fill: bool) -> (Vec<Subpath>, usize) {
 
 /// A curve as points within `tolerance_mm` of it, neighbours apart; fewer than two if it is nowhere
 /// longer than a nanometre. Every end of an element of the curve is among the points.
-///
-/// # Accuracy
-/// Guaranteed, other than `kurbo::flatten`, whose estimate is exceeded by half near cusps: steps of
-/// equal parameter h, of which each is off by at most h²/8 times the greatest second derivative.
 pub fn flattened(curve: &BezPath, tolerance_mm: f64) -> Vec<Point> {
     let mut points: Vec<Point> = Vec::with_capacity(curve.elements().len());
     let mut add = |p: Point| match points.last() {
         Some(last) if last.distance(p) < SAME_PLACE_MM => {}
         _ => points.push(p),
     };
-    for segment in curve.segments() {
-        add(segment.start());
-        // A cubic's second derivative is linear, so that it is greatest at one of its ends.
-        let bend_mm = match segment {
-            PathSeg::Line(_) => 0.0,
-            PathSeg::Quad(q) => 2.0 * bend(q.p0, q.p1, q.p2),
-            PathSeg::Cubic(c) => 6.0 * bend(c.p0, c.p1, c.p2).max(bend(c.p1, c.p2, c.p3)),
-        };
-        let n_steps = (bend_mm / (8.0 * tolerance_mm)).sqrt().ceil().max(1.0) as usize;
-        for step in 1..n_steps {
-            add(segment.eval(step as f64 / n_steps as f64));
-        }
-        add(segment.end());
-    }
+    flatten(curve, tolerance_mm, &mut add);
     // The end must stay exact: a last point that was too near takes its neighbour's place.
     if let Some(end) = curve.elements().last().and_then(PathEl::end_point)
         && points.len() > 1
@@ -79,11 +63,6 @@ pub fn flattened(curve: &BezPath, tolerance_mm: f64) -> Vec<Point> {
         points[at] = end;
     }
     points
-}
-
-/// Length of a second difference.
-fn bend(a: Point, b: Point, c: Point) -> f64 {
-    (a.to_vec2() - 2.0 * b.to_vec2() + c.to_vec2()).hypot()
 }
 
 #[derive(Default)]

@@ -100,9 +100,6 @@ pub enum Error {
     /// The twin does not go on.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// The report cannot be made.
-    #[error("the picture cannot be made: {0}")]
-    Picture(String),
 }
 
 /// An error in parts, for programs.
@@ -155,7 +152,6 @@ impl Error {
             Self::Audit(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),
-            Self::Picture(message) => ("mark.png".into(), message.clone(), String::new()),
         };
         Fault { message: self.to_string(), place, value, limit }
     }

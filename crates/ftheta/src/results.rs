@@ -5,7 +5,6 @@ use crate::mark::Marked;
 use crate::output::Output;
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::warning::Warning;
-use ftheta_planner::classic::Settings;
 use ftheta_report::plate::{PlateOptions, plate_png};
 use ftheta_report::report::{ReportInput, TimeSplit, report_html};
 
@@ -59,13 +58,14 @@ fn report(marked: &Marked, about: &About<'_>, plate_png: &[u8]) -> String {
             jump_s: times.jump_s - times.delay_s,
             delay_s: times.delay_s,
         },
-        settings: &settings_rows(marked, &marked.settings),
+        settings: &settings_rows(marked),
         warnings: about.warnings,
         plate_png,
     })
 }
 
-fn settings_rows(marked: &Marked, settings: &Settings) -> Vec<(String, String)> {
+fn settings_rows(marked: &Marked) -> Vec<(String, String)> {
+    let settings = &marked.settings;
     let machine = &marked.plan.machine;
     let laser = &machine.laser;
     let us = |time_s: f64| format!("{:.0} µs", time_s * 1e6);

@@ -3,7 +3,7 @@
 use crate::arguments::{Machine, MachineAction};
 use crate::json;
 use crate::screen::say;
-use ftheta::formats::machine::{PRESETS, preset};
+use ftheta::formats::machine::{self, PRESETS};
 use ftheta::model::machine::{Lens, Machine as MachineFile};
 use ftheta::physics::audit::check_field;
 use ftheta::physics::galvo::Galvo;
@@ -23,11 +23,7 @@ pub fn run(arguments: &Machine, as_json: bool) -> Result<(), Error> {
 }
 
 fn list(as_json: bool) -> Result<(), Error> {
-    let mut rows = Vec::new();
-    for name in PRESETS {
-        let machine = preset(name).map_or_else(|| machines::find(name), |read| Ok(read?))?;
-        rows.push(machine);
-    }
+    let rows = PRESETS.into_iter().map(machines::find).collect::<Result<Vec<_>, _>>()?;
     if as_json {
         let machines: Vec<Value> = rows.iter().map(summary).collect();
         json::print(&json!({"machines": machines}));
@@ -65,8 +61,8 @@ fn summary(machine: &MachineFile) -> Value {
 }
 
 fn show(name: &str, as_json: bool) -> Result<(), Error> {
-    let (_, text) = machines::source(name)?;
-    let machine = machines::find(name)?;
+    let (file, text) = machines::source(name)?;
+    let machine = machine::read(&file, &text)?;
     if as_json {
         json::print(&json!({"name": machine.name, "toml": text}));
     } else {

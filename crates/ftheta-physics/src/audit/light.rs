@@ -1,8 +1,6 @@
 //! Checks that light falls only while its mark is being made.
 
 use super::AuditError;
-use crate::galvo::Galvo;
-use crate::servo::Gains;
 use ftheta_model::plan::PlanDraft;
 
 /// Checks power, order and place in time of every light interval.
@@ -10,11 +8,11 @@ use ftheta_model::plan::PlanDraft;
 /// The beam follows the command by the servo's lag, and light follows its edge by the laser's
 /// latency. In command time an interval has to lie within its mark's segments; settings of a
 /// classic controller may be wrong by one lag, never by more.
-pub fn check_light(draft: &PlanDraft) -> Result<(), AuditError> {
+///
+/// * `lag_s`: the nominal servo's lag
+pub fn check_light(draft: &PlanDraft, lag_s: f64) -> Result<(), AuditError> {
     let machine = &draft.machine;
-    let tick_s = machine.output.period_s();
-    let gains = Gains::design(&machine.scanner, tick_s)?;
-    let lag_ns = (gains.lag_s(&Galvo::new(&machine.scanner)) * 1e9) as i64;
+    let lag_ns = (lag_s * 1e9) as i64;
     let slack_ns = lag_ns + i64::from(machine.output.period_ns);
     let windows = mark_windows(draft)?;
     let end_ns = draft.n_samples() * u64::from(machine.output.period_ns);
