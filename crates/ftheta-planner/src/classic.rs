@@ -171,7 +171,8 @@ impl Builder<'_> {
         let mut end_s = start_s;
         let points = &mark.points;
         for index in 1..points.len() {
-            run.length_mm += points[index - 1].distance(points[index]);
+            // From the vertex, not the point before: the first may differ by what is one place.
+            run.length_mm += self.vertices[self.last_vertex() as usize].distance(points[index]);
             self.vertices.push(points[index]);
             let wait_s = match points.get(index + 1) {
                 Some(&next) => {

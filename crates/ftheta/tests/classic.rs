@@ -95,6 +95,17 @@ fn same_job_gives_same_plan_and_mismatch_only_touches_the_twin() {
     assert!(first.score.contour_error_um.rms != other.score.contour_error_um.rms);
 }
 
+/// Marks that all but touch are joined without a jump, and the plan holds together.
+#[test]
+fn marks_that_all_but_touch_are_joined() {
+    let recipe = at_speed(1000.0, ClassicRecipe::default());
+    let elements = r#"<path d="M10 10 h5"/><path d="M15.0000003 10 h5"/>"#;
+    let job = drawing(elements, &recipe);
+    let options = MarkOptions { order: Order::Keep, ..MarkOptions::default() };
+    let marked = mark(&job, &preset("S10"), &recipe, &options, &mut |_| {}).unwrap();
+    assert_eq!((marked.plan.marks.len(), marked.times.n_jumps), (2, 0));
+}
+
 #[test]
 fn noise_is_seeded() {
     let (machine, recipe) = (preset("S10"), at_speed(1000.0, ClassicRecipe::default()));
