@@ -137,7 +137,7 @@ pub struct Jump {
 pub enum LawName {
     /// Fewest ticks on the nominal axis.
     Optimal,
-    /// Fewest ticks that stand the machine's uncertainty, for a driver that controls current.
+    /// Fewest ticks that stand the machine's uncertainty of mode and damping.
     Robust,
     /// Every law.
     All,

@@ -15,9 +15,6 @@ pub enum Law {
     /// Fewest ticks on the nominal axis, ending exactly at rest.
     Optimal,
     /// Fewest ticks that also stand the machine's uncertainty of mode and damping.
-    ///
-    /// Its program takes the current as given. Driven by voltage alone, as here, the mode's own
-    /// back-EMF changes that current, and the end may be off by up to twice the tolerance.
     Robust,
 }
 

@@ -1,6 +1,6 @@
 //! One axis as the jump programs see it: discrete motion, limits, and plants to be robust against.
 
-use super::program::{self, Solution, Tube};
+use super::program::{self, Ends, Goal, Request, Way};
 use super::{JumpError, polish};
 use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::{CURRENT, Galvo, State, Step};
@@ -16,6 +16,11 @@ const BOUNDED_OFTEN: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 const N_FREQUENCIES: usize = 7;
 /// Damping ratios that a robust jump stands: nobody measures them, so both ends of what is seen.
 const DAMPING_RATIOS: [f64; 2] = [0.0025, 0.02];
+/// When one looks at what is left of the motion, in units of the time that a left current needs to
+/// drive the rigid part farthest away.
+const LOOKS: [f64; N_LOOKS] = [0.0, 0.5, 1.0];
+/// Number of looks.
+pub(super) const N_LOOKS: usize = 3;
 /// Part of the allowed end error that the program may use.
 const ERROR_SHARE: f64 = 0.95;
 
@@ -26,9 +31,9 @@ pub enum Model {
     Rigid,
     /// The nominal mode, exact rest.
     Flexible,
-    /// Rigid motion to exact rest; the mirror's residual vibration stays below this many rad for
-    /// every frequency within the scanner's uncertainty and every damping ratio from 0.0025 to
-    /// 0.02, driven by the one nominal current.
+    /// Driven by these voltages, every plant whose mode is within the scanner's uncertainty and
+    /// whose damping ratio is from 0.0025 to 0.02 ends within this many rad of the target, its
+    /// vibration included, and stays there; nominally no current is left.
     Robust {
         /// Allowed end error, rad mechanical.
         epsilon_rad: f64,
@@ -71,12 +76,33 @@ pub struct Reach {
 /// A quantity inside a tick: weights of the states before it, and of its voltage.
 type Weights = (State, f64);
 
-/// One plant whose vibration at the end is bounded.
+/// One plant whose distance from rest at the end is bounded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plant {
     pub(super) step: Step,
-    /// Its angular frequency, rad/s.
-    pub(super) omega: f64,
+    /// What is bounded at each look, as weights of the state at the end of the jump, rad.
+    pub(super) looks: [Look; N_LOOKS],
+}
+
+/// Weights of the state at the end of a jump in what is left at some time: how far the rigid part
+/// still has to creep, and the two components of the mirror's vibration, rad.
+pub(super) type Look = [State; 3];
+
+impl Plant {
+    /// How a quantity at the end depends on the voltage of each tick, rad/V.
+    pub(super) fn response(&self, mut weights: State, n_ticks: usize) -> Vec<f64> {
+        let mut response = vec![0.0; n_ticks];
+        for value in response.iter_mut().rev() {
+            *value = weights.dot(&self.step.b);
+            weights = self.step.a.transpose() * weights;
+        }
+        response
+    }
+
+    /// By how much the end is missed without any voltage.
+    pub(super) fn missed(&self, n_ticks: usize, start: &State, end: &State) -> State {
+        (0..n_ticks).fold(*start, |state, _| self.step.a * state) - end
+    }
 }
 
 /// One axis, its discrete motion and limits.
@@ -86,12 +112,14 @@ pub struct Axis {
     pub(super) step: Step,
     /// Which states the model has.
     pub(super) active: &'static [usize],
+    /// Which of them must be zero at the end.
+    pub(super) rest: &'static [usize],
     pub(super) tick_s: f64,
     pub(super) voltage_max_v: f64,
     pub(super) current_max_a: f64,
     /// The motion behind `step`.
     pub(super) galvo: Galvo,
-    /// Plants whose residual vibration is bounded, and the bound, rad.
+    /// Plants whose distance from rest is bounded, and the bound, rad.
     pub(super) plants: Vec<Plant>,
     pub(super) residual_max_rad: f64,
     /// Current where it is checked inside the tick.
@@ -108,14 +136,16 @@ impl Axis {
     pub fn new(scanner: &Scanner, options: AxisOptions) -> Result<Self, JumpError> {
         check(scanner, options)?;
         let nominal = Galvo::new(scanner);
-        let (galvo, active): (Galvo, &'static [usize]) = match options.model {
-            Model::Flexible => (nominal, &[0, 1, 2, 3, 4]),
-            Model::Rigid | Model::Robust { .. } => (rigid(&nominal), &[0, 1, 4]),
+        let (galvo, active, rest): (Galvo, &'static [usize], &'static [usize]) = match options.model
+        {
+            Model::Rigid => (rigid(&nominal), &[0, 1, 4], &[1, 4]),
+            Model::Flexible => (nominal, &[0, 1, 2, 3, 4], &[1, 2, 3, 4]),
+            Model::Robust { .. } => (nominal, &[0, 1, 2, 3, 4], &[4]),
         };
         let mut plants = Vec::new();
         let mut residual_max_rad = f64::INFINITY;
         if let Model::Robust { epsilon_rad } = options.model {
-            plants = uncertain(&galvo, scanner.f1_uncertainty, options.tick_s);
+            plants = uncertain(&nominal, scanner.f1_uncertainty, options.tick_s);
             residual_max_rad = ERROR_SHARE * epsilon_rad;
         }
         let (inside, bounded) = match options.current_bound {
@@ -125,6 +155,7 @@ impl Axis {
         Ok(Self {
             step: galvo.step(options.tick_s),
             active,
+            rest,
             tick_s: options.tick_s,
             voltage_max_v: scanner.voltage_max_v * (1.0 - options.voltage_reserve),
             current_max_a: scanner.current_max_a,
@@ -147,18 +178,40 @@ impl Axis {
     /// is at rest within 1e-9 of the step after exact propagation. The step is the longest but
     /// for 1e-8 of it, or 2e-5 with the current bounded at every time of a 10 µs tick.
     pub fn longest(&self, n_ticks: usize) -> Result<Option<Reach>, JumpError> {
-        // Every state but the angle must come back to zero, and one voltage sets the scale.
-        if n_ticks < self.active.len() {
+        let request = Request { n_ticks, ends: Ends::rest(), goal: Goal::Farthest, way: Way::Free };
+        let found = self.best(&request)?;
+        Ok(found.map(|(step_rad, voltages_v)| Reach { step_rad, voltages_v }))
+    }
+
+    /// The factor on the request's ends and the voltages, exact; `None` if nothing is reached.
+    pub(super) fn best(&self, request: &Request) -> Result<Option<(f64, Vec<f64>)>, JumpError> {
+        // Every state that counts must be met, and one voltage sets the scale.
+        if request.n_ticks <= self.rest.len() {
             return Ok(None);
         }
-        let Solution { voltages_v, .. } = program::solve(self, n_ticks, None)?;
-        Ok(polish::polish(self, voltages_v))
+        Ok(polish::polish(self, request, program::solve(self, request)?))
     }
 
     /// The longest step as the linear program states it, rad: without correction for the current
     /// inside the ticks, which vanishes with the tick.
-    pub(super) fn longest_rad(&self, n_ticks: usize, tube: Option<Tube>) -> Result<f64, JumpError> {
-        program::solve(self, n_ticks, tube).map(|solution| solution.step_rad)
+    pub(super) fn longest_rad(&self, n_ticks: usize, way: Way) -> Result<f64, JumpError> {
+        let request = Request { n_ticks, ends: Ends::rest(), goal: Goal::Farthest, way };
+        program::solve(self, &request).map(|solution| solution.factor)
+    }
+
+    /// Whether the end is where the axis creeps to without voltage, not where it is.
+    pub(super) fn creeps(&self) -> bool {
+        !self.plants.is_empty()
+    }
+
+    /// Weights of the states in the angle to which the axis creeps without voltage, rad.
+    pub(super) fn creep_row(&self) -> State {
+        creep_row(&self.galvo)
+    }
+
+    /// How far these voltages move that angle, rad.
+    pub(super) fn creep_rad(&self, voltages_v: &[f64]) -> f64 {
+        voltages_v.iter().sum::<f64>() * self.tick_s / self.galvo.torque_constant
     }
 
     /// State after the tick.
@@ -189,20 +242,43 @@ fn currents(galvo: &Galvo, tick_s: f64) -> (Vec<Weights>, Vec<Weights>) {
     (inside, bounded.iter().copied().map(at).collect())
 }
 
-/// The same motor with a stiff shaft.
-///
-/// With the whole inertia in the rotor the twist no longer acts on the coil; it then only rides
-/// along, driven by the current, and equals the error of the mirror, (Jr/J) q of the real shaft.
+/// The same motor with a stiff shaft: with the whole inertia in the rotor the twist no longer acts
+/// on the coil.
 fn rigid(nominal: &Galvo) -> Galvo {
     Galvo { rotor_inertia: nominal.inertia(), mirror_inertia: 0.0, ..*nominal }
 }
 
+/// Weights of the states in the angle to which the axis creeps without voltage, rad.
+///
+/// The coil's and the motor's equations, integrated: `x + (Jm/J) q + (R J/Kt²) x' + (L/Kt) I` grows
+/// by `U/Kt` alone, whatever the mode.
+fn creep_row(galvo: &Galvo) -> State {
+    let (kt, j) = (galvo.torque_constant, galvo.inertia());
+    let rotor = galvo.mirror_inertia / j;
+    State::new(1.0, galvo.resistance * j / (kt * kt), rotor, 0.0, galvo.inductance / kt)
+}
+
 /// Plants over the uncertainty of the mode.
-fn uncertain(rigid: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
+///
+/// Without voltage all of them creep to the same place, and that is where the step leads. What the
+/// rigid part is short of it, and the vibration, both only decay once the current is gone.
+fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
     let middle = (N_FREQUENCIES / 2) as f64;
+    let mut creep = creep_row(nominal);
+    creep[0] = 0.0;
+    let share = nominal.rotor_inertia / nominal.inertia();
     let plant = |index: usize, damping_ratio: f64| {
-        let omega = rigid.omega * (1.0 + uncertainty * (index as f64 / middle - 1.0));
-        Plant { step: Galvo { omega, damping_ratio, ..*rigid }.step(tick_s), omega }
+        let omega = nominal.omega * (1.0 + uncertainty * (index as f64 / middle - 1.0));
+        let plant = Galvo { omega, damping_ratio, ..*nominal };
+        let (coil, motor) = (nominal.resistance / nominal.inductance, creep[1].recip());
+        let farthest_s = (coil / motor).ln() / (coil - motor);
+        let looks = LOOKS.map(|look| {
+            let later = plant.step(look * farthest_s).a.transpose();
+            let q = State::new(0.0, 0.0, share, 0.0, 0.0);
+            let speed = State::new(0.0, 0.0, 0.0, share / omega, 0.0);
+            [creep, q, speed].map(|weights| later * weights)
+        });
+        Plant { step: plant.step(tick_s), looks }
     };
     (0..N_FREQUENCIES)
         .flat_map(|index| DAMPING_RATIOS.map(|damping_ratio| plant(index, damping_ratio)))

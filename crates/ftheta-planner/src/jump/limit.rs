@@ -1,6 +1,6 @@
 //! The shortest time of a step: in continuous time, and in whole ticks.
 
-use super::program::Tube;
+use super::program::{Tube, Way};
 use super::{Axis, AxisOptions, CurrentBound, JumpError, Model};
 use ftheta_model::machine::Scanner;
 
@@ -30,7 +30,7 @@ pub fn limit_s(scanner: &Scanner, step_rad: f64, model: Model) -> Result<f64, Ju
     let step_rad = step_rad.abs();
     check_step(step_rad)?;
     invert(scanner, step_rad, |time_s| {
-        segmented(scanner, model, time_s)?.longest_rad(N_SEGMENTS, None)
+        segmented(scanner, model, time_s)?.longest_rad(N_SEGMENTS, Way::Free)
     })
 }
 
@@ -59,7 +59,8 @@ pub fn settle_limit_s(
     let tail_s = TAIL_PERIODS / scanner.torsional_mode_hz;
     invert(scanner, step_rad, |time_s| {
         let n_tail = (tail_s / time_s * N_SEGMENTS as f64).ceil().clamp(2.0, N_TAIL_MAX) as usize;
-        segmented(scanner, Model::Flexible, time_s)?.longest_rad(N_SEGMENTS + n_tail, Some(tube))
+        segmented(scanner, Model::Flexible, time_s)?
+            .longest_rad(N_SEGMENTS + n_tail, Way::Near(tube))
     })
 }
 

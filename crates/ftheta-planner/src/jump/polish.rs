@@ -1,32 +1,35 @@
-//! Makes a solver's voltages exact: rest at the end, limits kept also inside the ticks.
+//! Makes a solver's voltages exact: the end met, limits kept also inside the ticks.
 
-use super::axis::{Axis, Plant, Reach};
+use super::axis::{Axis, Look, Plant};
+use super::program::{Ends, Request, Solution};
 use ftheta_physics::galvo::{State, Step};
 use nalgebra::{DMatrix, DVector};
 
-/// Corrections until the end is at rest to rounding.
+/// Corrections until the end is met to rounding.
 const N_CORRECTIONS: usize = 4;
-/// Rest at the end, as a part of the step.
+/// Defect at the end, as a part of the largest of the ends.
 const REST: f64 = 1e-10;
 /// So that rounding in a later scaling cannot pass a limit.
 const INSIDE: f64 = 1.0 - 1e-11;
 /// A saturated tick may move by this part of what a free one does.
 const SATURATED: f64 = 1e-6;
 
-/// The same voltages, corrected; `None` if they do not come to rest, as with too few ticks.
+/// The factor and the voltages, corrected; `None` if the end is not met, as with too few ticks.
 ///
-/// An interior-point solution ends at rest to about 1e-9 of its largest state. The correction of
+/// An interior-point solution meets the end to about 1e-9 of its largest state. The correction of
 /// least norm on the ticks with voltage to spare brings it to rounding; then everything is scaled
 /// down, by about as much, until no limit is passed.
-pub(super) fn polish(axis: &Axis, mut voltages_v: Vec<f64>) -> Option<Reach> {
-    let rest = rest_units(axis);
-    let columns = end_columns(axis, voltages_v.len(), &rest);
+pub(super) fn polish(
+    axis: &Axis,
+    request: &Request,
+    solution: Solution,
+) -> Option<(f64, Vec<f64>)> {
+    let Solution { mut factor, mut voltages_v } = solution;
+    let ends = &request.ends;
+    let rows = end_rows(axis, ends);
+    let columns = end_columns(axis, voltages_v.len(), &rows);
     for _ in 0..N_CORRECTIONS {
-        let (end, _) = run(axis, &voltages_v);
-        let defect = DVector::from_iterator(
-            rest.len(),
-            rest.iter().map(|&(state, unit)| -end[state] / unit),
-        );
+        let defect = -defect(axis, ends, factor, &voltages_v, &rows);
         let room = |voltage: &f64| (1.0 - (voltage / axis.voltage_max_v).abs()).max(SATURATED);
         let room = DVector::from_iterator(voltages_v.len(), voltages_v.iter().map(room));
         let weighted = DMatrix::from_fn(columns.nrows(), columns.ncols(), |row, column| {
@@ -38,45 +41,86 @@ pub(super) fn polish(axis: &Axis, mut voltages_v: Vec<f64>) -> Option<Reach> {
             *voltage += change;
         }
     }
-    let (_, peak_current_a) = run(axis, &voltages_v);
+    let (_, peak_current_a) = run(axis, ends, factor, &voltages_v);
     let peak_voltage_v = voltages_v.iter().fold(0.0_f64, |peak, voltage| peak.max(voltage.abs()));
     let room = (axis.voltage_max_v / peak_voltage_v)
         .min(axis.current_max_a / peak_current_a)
-        .min(axis.residual_max_rad / residual_rad(axis, &voltages_v))
-        .min(1.0);
-    for voltage in &mut voltages_v {
-        *voltage *= room * INSIDE;
-    }
-    let (end, _) = run(axis, &voltages_v);
-    let step_rad = end[0];
-    let at_rest = rest.iter().all(|&(state, unit)| end[state].abs() <= REST * step_rad * unit);
-    at_rest.then_some(Reach { step_rad, voltages_v })
+        .min(axis.residual_max_rad / residual_rad(axis, ends, factor, &voltages_v))
+        .min(1.0)
+        * INSIDE;
+    voltages_v.iter_mut().for_each(|voltage| *voltage *= room);
+    factor *= room;
+    let size = factor
+        * rows
+            .iter()
+            .map(|row| row.weights.dot(&(ends.end - ends.start)).abs())
+            .fold(0.0, f64::max);
+    let met = defect(axis, ends, factor, &voltages_v, &rows).amax() <= REST * size;
+    met.then_some((factor, voltages_v))
 }
 
-/// States that must be zero at the end, with what of each counts like one radian.
-fn rest_units(axis: &Axis) -> Vec<(usize, f64)> {
+/// Something that must be met at the end.
+struct EndRow {
+    /// Weights of the states in it, rad.
+    weights: State,
+    /// Whether it is the angle to which the axis creeps.
+    creep: bool,
+}
+
+/// What must be met at the end, with what of each counts like one radian.
+fn end_rows(axis: &Axis, ends: &Ends) -> Vec<EndRow> {
     let omega = axis.galvo.omega;
     let acceleration = axis.galvo.torque_constant / axis.galvo.inertia();
     let units = [1.0, omega, 1.0, omega, omega * omega / acceleration];
-    axis.active.iter().skip(1).map(|&state| (state, units[state])).collect()
+    let row = |state: usize| {
+        let mut weights = State::zeros();
+        weights[state] = units[state].recip();
+        EndRow { weights, creep: false }
+    };
+    let mut rows: Vec<EndRow> = axis.rest.iter().map(|&state| row(state)).collect();
+    if ends.place {
+        rows.push(match axis.creeps() {
+            true => EndRow { weights: axis.creep_row(), creep: true },
+            false => row(0),
+        });
+    }
+    rows
 }
 
-/// How each voltage changes the states that must be zero, in their units.
-fn end_columns(axis: &Axis, n_ticks: usize, rest: &[(usize, f64)]) -> DMatrix<f64> {
-    let mut columns = DMatrix::zeros(rest.len(), n_ticks);
+/// By how much each row is missed at the end, rad.
+fn defect(
+    axis: &Axis,
+    ends: &Ends,
+    factor: f64,
+    voltages_v: &[f64],
+    rows: &[EndRow],
+) -> DVector<f64> {
+    let (end, _) = run(axis, ends, factor, voltages_v);
+    let missed = end - ends.end * factor;
+    let creep_rad =
+        axis.creep_rad(voltages_v) - axis.creep_row().dot(&(ends.end - ends.start)) * factor;
+    let values =
+        rows.iter().map(|row| if row.creep { creep_rad } else { row.weights.dot(&missed) });
+    DVector::from_iterator(rows.len(), values)
+}
+
+/// How each voltage changes the rows, rad/V.
+fn end_columns(axis: &Axis, n_ticks: usize, rows: &[EndRow]) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(rows.len(), n_ticks);
     let mut effect = axis.step.b;
     for tick in (0..n_ticks).rev() {
-        for (row, &(state, unit)) in rest.iter().enumerate() {
-            columns[(row, tick)] = effect[state] / unit;
+        for (index, row) in rows.iter().enumerate() {
+            columns[(index, tick)] =
+                if row.creep { axis.creep_rad(&[1.0]) } else { row.weights.dot(&effect) };
         }
         effect = axis.step.a * effect;
     }
     columns
 }
 
-/// End state and greatest current, from rest at zero.
-fn run(axis: &Axis, voltages_v: &[f64]) -> (State, f64) {
-    let mut state = State::zeros();
+/// End state and greatest current.
+fn run(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> (State, f64) {
+    let mut state = ends.start * factor;
     let mut peak_current_a = 0.0_f64;
     for &voltage in voltages_v {
         peak_current_a = peak_current_a.max(axis.peak_current_a(&state, voltage));
@@ -85,12 +129,18 @@ fn run(axis: &Axis, voltages_v: &[f64]) -> (State, f64) {
     (state, peak_current_a)
 }
 
-/// Greatest residual vibration of the uncertain plants, rad.
-fn residual_rad(axis: &Axis, voltages_v: &[f64]) -> f64 {
+/// Greatest distance of the uncertain plants from what the end must be, rad.
+fn residual_rad(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> f64 {
     let residual = |plant: &Plant| {
         let Step { a, b } = plant.step;
-        let end = voltages_v.iter().fold(State::zeros(), |state, voltage| a * state + b * *voltage);
-        end[2].hypot(end[3] / plant.omega)
+        let start = ends.start * factor;
+        let end = voltages_v.iter().fold(start, |state, voltage| a * state + b * *voltage);
+        let missed = end - ends.end * factor;
+        let at_look = |look: &Look| {
+            let [creep, q, speed] = look.map(|weights| weights.dot(&missed));
+            creep.abs() + q.hypot(speed)
+        };
+        plant.looks.iter().map(at_look).fold(0.0, f64::max)
     };
     axis.plants.iter().map(residual).fold(0.0, f64::max)
 }

@@ -1,17 +1,16 @@
-//! The linear program of the longest step: voltages and states as variables, sparse and banded.
+//! The program of the longest transition: voltages and states as variables, sparse and banded.
 //!
 //! The condensed form, with voltages alone, is dense and loses the end condition in rounding;
 //! with the states as variables every row couples neighbours only.
 
 use super::JumpError;
-use super::axis::{Axis, Plant};
+use super::axis::{Axis, N_LOOKS};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus,
     SupportedConeT, ZeroConeT,
 };
 use ftheta_physics::galvo::{CURRENT, State};
-use nalgebra::Matrix2;
 
 /// Balancing and regularisation of the solver, in the order tried. With its own 1e-8 one robust
 /// program in fifty stalls; with 1e-7 one in four hundred, most of which the others finish.
@@ -19,16 +18,52 @@ const ATTEMPTS: [(bool, f64); 3] = [(true, 1e-7), (true, 1e-8), (false, 1e-7)];
 /// Feasibility and gap, in units of the largest values.
 const TOLERANCE: f64 = 1e-9;
 
-/// What the program gives.
-pub(super) struct Solution {
-    /// Longest step, rad.
-    pub(super) step_rad: f64,
-    /// Voltage of each tick, V; inexact by the tolerance.
-    pub(super) voltages_v: Vec<f64>,
+/// What a program is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Request {
+    /// Ticks from start to end.
+    pub(super) n_ticks: usize,
+    /// Where it leads, for a factor of one.
+    pub(super) ends: Ends,
+    /// What is best.
+    pub(super) goal: Goal,
+    /// Where the mirror must be on the way.
+    pub(super) way: Way,
 }
 
-/// From a tick on the mirror stays near the step, for good.
-#[derive(Clone, Copy, Debug)]
+/// Start and end states for a factor of one; the start is at angle zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ends {
+    /// State at the start.
+    pub(super) start: State,
+    /// State at the end.
+    pub(super) end: State,
+    /// Whether the angle at the end counts.
+    pub(super) place: bool,
+}
+
+/// What is best.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Goal {
+    /// The greatest factor.
+    Farthest,
+    /// The least heat in the coil at this factor.
+    Coolest(f64),
+}
+
+/// Where the mirror must be on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Way {
+    /// Anywhere.
+    Free,
+    /// From a tick on near the end, for good.
+    Near(Tube),
+    /// Never farther than this, rad.
+    Below(f64),
+}
+
+/// From a tick on the mirror stays near the end, for good.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tube {
     /// Ticks until the mirror is near.
     pub(super) arrival: usize,
@@ -36,16 +71,33 @@ pub(super) struct Tube {
     pub(super) epsilon_rad: f64,
 }
 
+/// What the program gives.
+pub(super) struct Solution {
+    /// Factor on the ends.
+    pub(super) factor: f64,
+    /// Voltage of each tick, V; inexact by the tolerance.
+    pub(super) voltages_v: Vec<f64>,
+}
+
+impl Ends {
+    /// From rest to rest, one radian away.
+    pub(super) fn rest() -> Self {
+        let end = State::new(1.0, 0.0, 0.0, 0.0, 0.0);
+        Self { start: State::zeros(), end, place: true }
+    }
+}
+
 /// Units in which the variables are of order one.
 struct Units {
     voltage: f64,
     state: State,
+    factor: f64,
 }
 
 impl Units {
-    fn new(axis: &Axis, n_ticks: usize) -> Self {
+    fn new(axis: &Axis, request: &Request) -> Self {
         let galvo = &axis.galvo;
-        let total = axis.tick_s * n_ticks as f64;
+        let total = axis.tick_s * request.n_ticks as f64;
         let voltage = axis.voltage_max_v;
         let current = axis.current_max_a.min(voltage * total / galvo.inductance);
         let acceleration = galvo.torque_constant / galvo.inertia() * current;
@@ -54,7 +106,9 @@ impl Units {
         let period = galvo.omega.recip().min(total);
         let state =
             State::new(angle, angle / total, twist * period * period, twist * period, current);
-        Self { voltage, state }
+        let Ends { start, end, .. } = request.ends;
+        let size = start.component_div(&state).amax().max(end.component_div(&state).amax());
+        Self { voltage, state, factor: size.recip() }
     }
 }
 
@@ -82,12 +136,12 @@ impl Rows {
     }
 }
 
-/// Where each variable stands: voltage and then states for each tick, the place of rest, and with
-/// a tube the step.
+/// Where each variable stands: voltage and then states for each tick, the factor, and for each
+/// uncertain plant what it still has to creep and the size of that.
 struct Layout {
     n_ticks: usize,
     n_states: usize,
-    tube: bool,
+    n_plants: usize,
 }
 
 impl Layout {
@@ -95,72 +149,90 @@ impl Layout {
         tick * (1 + self.n_states)
     }
 
-    /// Column of a state before this tick, which is neither the first nor behind the last.
+    /// Column of a state before this tick, which is not the first; after the last is the end.
     fn state(&self, tick: usize, position: usize) -> usize {
         self.voltage(tick - 1) + 1 + position
     }
 
-    fn rest(&self) -> usize {
-        self.voltage(self.n_ticks - 1) + 1
+    fn factor(&self) -> usize {
+        self.voltage(self.n_ticks)
     }
 
-    fn step(&self) -> usize {
-        self.rest() + usize::from(self.tube)
+    /// Column of what a plant has to creep at a look; the next is the size of that.
+    fn creep(&self, plant: usize, look: usize) -> usize {
+        self.factor() + 1 + 2 * (N_LOOKS * plant + look)
     }
 
     fn n_columns(&self) -> usize {
-        self.step() + 1
+        self.creep(self.n_plants, 0)
     }
 }
 
-/// The longest step from rest to rest.
+/// A program under construction.
+struct Program<'a> {
+    axis: &'a Axis,
+    request: &'a Request,
+    layout: Layout,
+    units: Units,
+    rows: Rows,
+}
+
+/// The best voltages for a request.
 ///
 /// # Errors
 /// If the solver does not reach its tolerance.
-pub(super) fn solve(
-    axis: &Axis,
-    n_ticks: usize,
-    tube: Option<Tube>,
-) -> Result<Solution, JumpError> {
-    let layout = Layout { n_ticks, n_states: axis.active.len(), tube: tube.is_some() };
-    let units = Units::new(axis, n_ticks);
-    let mut rows = Rows::default();
-    motion(axis, &layout, &units, &mut rows);
-    let n_equal = rows.right.len();
-    bounds(axis, &layout, &units, &mut rows);
-    if let Some(tube) = tube {
-        near(axis, tube, &layout, &units, &mut rows);
-    }
-    let n_bounds = rows.right.len() - n_equal;
-    for plant in &axis.plants {
-        residual(axis, plant, &layout, &units, &mut rows);
-    }
+pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpError> {
+    let n_ticks = request.n_ticks;
+    let layout = Layout { n_ticks, n_states: axis.active.len(), n_plants: axis.plants.len() };
+    let units = Units::new(axis, request);
+    let mut program = Program { axis, request, layout, units, rows: Rows::default() };
+    program.motion();
+    program.ends();
+    program.creeps();
+    let n_equal = program.rows.right.len();
+    program.bounds();
+    program.way();
+    program.creep_sizes();
+    let n_bounds = program.rows.right.len() - n_equal;
+    program.residuals();
     let mut cones = vec![ZeroConeT(n_equal), NonnegativeConeT(n_bounds)];
-    cones.resize(2 + axis.plants.len(), SecondOrderConeT(3));
-    let x = maximise(rows, &cones, &layout).map_err(|status| JumpError::Unsolved {
-        n_ticks,
-        tick_us: axis.tick_s * 1e6,
-        status,
-    })?;
+    cones.resize(2 + axis.plants.len() * N_LOOKS, SecondOrderConeT(3));
+    let Program { layout, units, rows, .. } = program;
+    let x = optimise(rows, &cones, &layout, request.goal)
+        .map_err(|status| JumpError::Unsolved { n_ticks, tick_us: axis.tick_s * 1e6, status })?;
     let voltage = |tick| x[layout.voltage(tick)] * units.voltage;
     Ok(Solution {
-        step_rad: x[layout.step()] * units.state[0],
+        factor: match request.goal {
+            Goal::Farthest => x[layout.factor()] * units.factor,
+            Goal::Coolest(factor) => factor,
+        },
         voltages_v: (0..n_ticks).map(voltage).collect(),
     })
 }
 
-/// The variables with the longest step; else the solver's status.
-fn maximise(
+/// The best variables; else the solver's status.
+fn optimise(
     rows: Rows,
     cones: &[SupportedConeT<f64>],
     layout: &Layout,
+    goal: Goal,
 ) -> Result<Vec<f64>, String> {
     let Rows { row, column, value, right } = rows;
     let (n_rows, n_columns) = (right.len(), layout.n_columns());
     let a = CscMatrix::new_from_triplets(n_rows, n_columns, row, column, value);
-    let p = CscMatrix::zeros((n_columns, n_columns));
     let mut cost = vec![0.0; n_columns];
-    cost[layout.step()] = -1.0;
+    let p = match goal {
+        Goal::Farthest => {
+            cost[layout.factor()] = -1.0;
+            CscMatrix::zeros((n_columns, n_columns))
+        }
+        Goal::Coolest(_) => {
+            let currents: Vec<usize> =
+                (1..=layout.n_ticks).map(|tick| layout.state(tick, layout.n_states - 1)).collect();
+            let ones = vec![1.0; currents.len()];
+            CscMatrix::new_from_triplets(n_columns, n_columns, currents.clone(), currents, ones)
+        }
+    };
     let mut ended = Err(String::new());
     for (equilibrate_enable, static_regularization_constant) in ATTEMPTS {
         let settings = DefaultSettings {
@@ -180,7 +252,7 @@ fn maximise(
         let solution = solver.solution;
         match solution.status {
             SolverStatus::Solved => return Ok(solution.x),
-            // The step may be 5e-5 short; the polish that follows keeps all limits anyhow.
+            // The factor may be 5e-5 short; the polish that follows keeps all limits anyhow.
             SolverStatus::AlmostSolved => ended = Ok(solution.x),
             status if ended.is_err() => ended = Err(format!("{status:?}")),
             _ => {}
@@ -189,97 +261,153 @@ fn maximise(
     ended
 }
 
-/// Adds that each state follows from the one before, from rest to rest at the step.
-fn motion(axis: &Axis, layout: &Layout, units: &Units, rows: &mut Rows) {
-    let n_ticks = layout.n_ticks;
-    for tick in 0..n_ticks {
-        for (position, &to) in axis.active.iter().enumerate() {
-            let mut entries =
-                vec![(layout.voltage(tick), axis.step.b[to] * units.voltage / units.state[to])];
-            if tick > 0 {
-                for (from_position, &from) in axis.active.iter().enumerate() {
-                    let gain = axis.step.a[(to, from)] * units.state[from] / units.state[to];
-                    entries.push((layout.state(tick, from_position), gain));
+impl Program<'_> {
+    /// Adds that each state follows from the one before.
+    fn motion(&mut self) {
+        let Self { axis, request, layout, units, rows } = self;
+        for tick in 0..layout.n_ticks {
+            for (position, &to) in axis.active.iter().enumerate() {
+                let unit = units.state[to];
+                let gain = axis.step.b[to] * units.voltage / unit;
+                let mut entries = vec![(layout.voltage(tick), gain)];
+                if tick == 0 {
+                    let free = (axis.step.a * request.ends.start)[to] * units.factor / unit;
+                    entries.push((layout.factor(), free));
+                } else {
+                    for (from_position, &from) in axis.active.iter().enumerate() {
+                        let gain = axis.step.a[(to, from)] * units.state[from] / unit;
+                        entries.push((layout.state(tick, from_position), gain));
+                    }
                 }
-            }
-            if tick + 1 < n_ticks {
                 entries.push((layout.state(tick + 1, position), -1.0));
-            } else if to == 0 {
-                entries.push((layout.rest(), -1.0));
-            }
-            rows.add(entries, 0.0);
-        }
-    }
-}
-
-/// Adds a circular cone: what speed, current and voltage leave behind in one plant's vibration is
-/// at most one, in units of its bound.
-fn residual(axis: &Axis, plant: &Plant, layout: &Layout, units: &Units, rows: &mut Rows) {
-    let mode: Matrix2<f64> = plant.step.a.fixed_view::<2, 2>(2, 2).into();
-    let bound = axis.residual_max_rad;
-    // From the state at the end of a tick to (q, q'/omega) at the end of the jump.
-    let mut later = Matrix2::new(1.0 / bound, 0.0, 0.0, 1.0 / (bound * plant.omega));
-    let mut entries = [Vec::new(), Vec::new()];
-    for tick in (0..layout.n_ticks).rev() {
-        for (component, entries) in entries.iter_mut().enumerate() {
-            let weight = |gain_q: f64, gain_speed: f64| {
-                later[(component, 0)] * gain_q + later[(component, 1)] * gain_speed
-            };
-            let (b, a) = (&plant.step.b, &plant.step.a);
-            entries.push((layout.voltage(tick), weight(b[2], b[3]) * units.voltage));
-            if tick > 0 {
-                for (position, &from) in axis.active.iter().enumerate() {
-                    let gain = weight(a[(2, from)], a[(3, from)]) * units.state[from];
-                    entries.push((layout.state(tick, position), gain));
-                }
-            }
-        }
-        later *= mode;
-    }
-    rows.add([], 1.0);
-    for entries in entries {
-        rows.add(entries, 0.0);
-    }
-}
-
-/// Adds the limits of voltage and current.
-fn bounds(axis: &Axis, layout: &Layout, units: &Units, rows: &mut Rows) {
-    let current = axis.current_max_a / units.state[CURRENT];
-    let position = axis.active.len() - 1;
-    for tick in 0..layout.n_ticks {
-        for sign in [1.0, -1.0] {
-            rows.add([(layout.voltage(tick), sign)], 1.0);
-            if tick > 0 {
-                rows.add([(layout.state(tick, position), sign)], current);
-                for (weights, gain) in &axis.bounded {
-                    let entries = axis.active.iter().enumerate().map(|(position, &state)| {
-                        let weight = weights[state] * units.state[state] / units.state[CURRENT];
-                        (layout.state(tick, position), weight * sign)
-                    });
-                    let gain = gain * units.voltage / units.state[CURRENT] * sign;
-                    rows.add(entries.chain([(layout.voltage(tick), gain)]), current);
-                }
+                rows.add(entries, 0.0);
             }
         }
     }
-}
 
-/// Adds that the mirror stays near the step from the arrival on.
-fn near(axis: &Axis, tube: Tube, layout: &Layout, units: &Units, rows: &mut Rows) {
-    let epsilon = tube.epsilon_rad / units.state[0];
-    let mirror = axis.galvo.mirror_row();
-    for tick in tube.arrival..=layout.n_ticks {
-        for sign in [1.0, -1.0] {
-            let mut entries = vec![(layout.step(), -sign)];
-            if tick == layout.n_ticks {
-                entries.push((layout.rest(), sign));
-            } else {
-                for (position, &state) in axis.active.iter().enumerate() {
-                    let gain = sign * mirror[state] * units.state[state] / units.state[0];
-                    entries.push((layout.state(tick, position), gain));
+    /// Adds what the end must be, and the factor if it is given.
+    fn ends(&mut self) {
+        let Self { axis, layout, units, .. } = self;
+        let Ends { start, end, place } = self.request.ends;
+        for (position, state) in axis.active.iter().enumerate() {
+            let counts = axis.rest.contains(state) || (place && !axis.creeps() && *state == 0);
+            if counts {
+                let target = end[*state] * units.factor / units.state[*state];
+                let last = layout.state(layout.n_ticks, position);
+                self.rows.add([(last, 1.0), (layout.factor(), -target)], 0.0);
+            }
+        }
+        if place && axis.creeps() {
+            let unit = units.state[0];
+            let gain = axis.creep_rad(&[units.voltage]) / unit;
+            let target = axis.creep_row().dot(&(end - start)) * units.factor / unit;
+            let voltages = (0..layout.n_ticks).map(|tick| (layout.voltage(tick), gain));
+            self.rows.add(voltages.chain([(layout.factor(), -target)]), 0.0);
+        }
+        if let Goal::Coolest(factor) = self.request.goal {
+            self.rows.add([(layout.factor(), 1.0)], factor / units.factor);
+        }
+    }
+
+    /// Adds what the plants still have to creep at each look, in units of the bound.
+    fn creeps(&mut self) {
+        for (plant, look) in self.plants_and_looks() {
+            let entries = self.missed(plant, self.axis.plants[plant].looks[look][0]);
+            let creep = (self.layout.creep(plant, look), -1.0);
+            self.rows.add(entries.into_iter().chain([creep]), 0.0);
+        }
+    }
+
+    /// Adds that the size of each creep is at least the creep, either sign.
+    fn creep_sizes(&mut self) {
+        for (plant, look) in self.plants_and_looks() {
+            let creep = self.layout.creep(plant, look);
+            for sign in [1.0, -1.0] {
+                self.rows.add([(creep, sign), (creep + 1, -1.0)], 0.0);
+            }
+        }
+    }
+
+    /// Adds circular cones: creep and vibration of each plant at each look are together at most
+    /// one, in units of the bound.
+    fn residuals(&mut self) {
+        for (plant, look) in self.plants_and_looks() {
+            self.rows.add([(self.layout.creep(plant, look) + 1, 1.0)], 1.0);
+            for weights in &self.axis.plants[plant].looks[look][1..] {
+                let entries = self.missed(plant, *weights);
+                self.rows.add(entries, 0.0);
+            }
+        }
+    }
+
+    fn plants_and_looks(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let n_plants = self.layout.n_plants;
+        (0..n_plants).flat_map(|plant| (0..N_LOOKS).map(move |look| (plant, look)))
+    }
+
+    /// By how much a plant misses its end, in units of the bound.
+    fn missed(&self, plant: usize, weights: State) -> Vec<(usize, f64)> {
+        let Self { axis, layout, units, request, .. } = self;
+        let (plant, bound) = (&axis.plants[plant], axis.residual_max_rad);
+        let gains = plant.response(weights, request.n_ticks);
+        let at = |(tick, gain)| (layout.voltage(tick), gain * units.voltage / bound);
+        let mut entries: Vec<_> = gains.into_iter().enumerate().map(at).collect();
+        let Ends { start, end, .. } = request.ends;
+        let free = weights.dot(&plant.missed(request.n_ticks, &start, &end));
+        entries.push((layout.factor(), free * units.factor / bound));
+        entries
+    }
+
+    /// Adds the limits of voltage and current.
+    fn bounds(&mut self) {
+        let Self { axis, layout, units, rows, .. } = self;
+        let current = axis.current_max_a / units.state[CURRENT];
+        let position = axis.active.len() - 1;
+        for tick in 0..layout.n_ticks {
+            for sign in [1.0, -1.0] {
+                rows.add([(layout.voltage(tick), sign)], 1.0);
+                if tick > 0 {
+                    rows.add([(layout.state(tick, position), sign)], current);
+                    for (weights, gain) in &axis.bounded {
+                        let entries = axis.active.iter().enumerate().map(|(position, &state)| {
+                            let weight = weights[state] * units.state[state] / units.state[CURRENT];
+                            (layout.state(tick, position), weight * sign)
+                        });
+                        let gain = gain * units.voltage / units.state[CURRENT] * sign;
+                        rows.add(entries.chain([(layout.voltage(tick), gain)]), current);
+                    }
                 }
             }
-            rows.add(entries, epsilon);
+        }
+    }
+
+    /// Adds where the mirror must be on the way.
+    fn way(&mut self) {
+        let Self { axis, request, layout, units, rows, .. } = self;
+        let mirror = axis.galvo.mirror_row();
+        let at = |tick: usize, sign: f64| {
+            let weight = |state: usize| sign * mirror[state] * units.state[state] / units.state[0];
+            let column = |position| layout.state(tick, position);
+            let entry = |(position, &state): (usize, &usize)| (column(position), weight(state));
+            axis.active.iter().enumerate().map(entry).collect::<Vec<_>>()
+        };
+        match request.way {
+            Way::Free => {}
+            Way::Near(tube) => {
+                let epsilon = tube.epsilon_rad / units.state[0];
+                let target = request.ends.end[0] * units.factor / units.state[0];
+                for tick in tube.arrival..=layout.n_ticks {
+                    for sign in [1.0, -1.0] {
+                        let target = [(layout.factor(), -sign * target)];
+                        rows.add(at(tick, sign).into_iter().chain(target), epsilon);
+                    }
+                }
+            }
+            Way::Below(limit_rad) => {
+                for tick in 1..=layout.n_ticks {
+                    rows.add(at(tick, 1.0), limit_rad / units.state[0]);
+                }
+            }
         }
     }
 }
