@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use ftheta::jump::Law;
+use ftheta::model::plan::Planner;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
 use std::ops::RangeInclusive;
@@ -61,9 +62,15 @@ pub struct Mark {
     /// Speed of all pens, mm/s, instead of the recipe's.
     #[arg(long, value_name = "MM_S", value_parser = positive)]
     pub speed: Option<f64>,
-    /// How the motion is planned.
-    #[arg(long, value_enum, default_value = "classic")]
-    pub planner: PlannerName,
+    /// How the motion is planned; without it the best that the machine's drive allows.
+    #[arg(long, value_enum)]
+    pub planner: Option<PlannerName>,
+    /// Part of the voltage that planned jumps keep for the servo's feedback, 0 to 0.9.
+    #[arg(long, value_name = "R", default_value = "0.12", value_parser = reserve)]
+    pub reserve: f64,
+    /// Folder for jump atlases, so that they are built once; the system's cache if not given.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
     /// Greatest distance of the beam from a mark, µm.
     #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
     pub tolerance_um: f64,
@@ -198,8 +205,19 @@ pub enum MachineAction {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub enum PlannerName {
+    /// Jumps at the limit of motors and resonance; marks as the classic planner's.
+    Optimal,
     /// What RTC- and EZCAD-type controllers do: constant speed and delays.
     Classic,
+}
+
+impl From<PlannerName> for Planner {
+    fn from(name: PlannerName) -> Self {
+        match name {
+            PlannerName::Optimal => Self::Optimal,
+            PlannerName::Classic => Self::Classic,
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -1,5 +1,6 @@
 //! File syntax of ftheta: SVG drawings, machine and recipe files, plan files.
 
+pub mod atlas_file;
 pub mod machine;
 pub mod plan_file;
 pub mod recipe;

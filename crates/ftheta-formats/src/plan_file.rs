@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use std::str::{FromStr, SplitWhitespace};
 use thiserror::Error;
 
-const HEADER: &str = "ftheta-plan 1";
+const HEADER: &str = "ftheta-plan 2";
 
 /// What is wrong with a plan file.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -67,6 +67,11 @@ pub fn write(draft: &PlanDraft, id: &str, out: &mut impl Write) -> io::Result<()
     for vertex in &draft.vertices {
         writeln!(out, "{} {}", vertex.x, vertex.y)?;
     }
+    writeln!(out, "sequences {}", draft.sequences_v.len())?;
+    for sequence_v in &draft.sequences_v {
+        let volts: Vec<String> = sequence_v.iter().map(f64::to_string).collect();
+        writeln!(out, "{}", volts.join(" "))?;
+    }
     writeln!(out, "segments {}", draft.segments.len())?;
     for segment in &draft.segments {
         write_segment(segment, out)?;
@@ -86,6 +91,9 @@ fn write_segment(segment: &Segment, out: &mut impl Write) -> io::Result<()> {
     }
     match segment.motion {
         Motion::Hold { vertex } => writeln!(out, "hold {vertex}"),
+        Motion::Jump { from_vertex, to_vertex, sequence } => {
+            writeln!(out, "jump {from_vertex} {to_vertex} {sequence}")
+        }
         Motion::Travel { first_vertex, n_vertices, profile: p, interpolation } => {
             let kind = match interpolation {
                 Interpolation::Absolute => "travel",
@@ -108,11 +116,12 @@ pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
     let mut lines = Lines { lines: text.lines(), number: 0 };
     let header = lines.next("the header of a plan file")?;
     if header != HEADER {
-        return Err(lines.error("\"ftheta-plan 1\"", header));
+        return Err(lines.error("\"ftheta-plan 2\"", header));
     }
     let id = lines.after("id")?.to_owned();
     let planner = match lines.after("planner")? {
         "classic" => Planner::Classic,
+        "optimal" => Planner::Optimal,
         other => return Err(lines.error("a known planner", other)),
     };
     let tolerance_mm = lines.number_after("tolerance_mm")?;
@@ -131,6 +140,7 @@ pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
         pens: lines.table("pens", read_pen)?,
         marks: lines.table("marks", read_mark)?,
         vertices: lines.table("vertices", read_vertex)?,
+        sequences_v: lines.table("sequences", read_sequence)?,
         segments: lines.table("segments", read_segment)?,
     };
     let last = lines.next("the last line, \"end\"")?;
@@ -182,6 +192,11 @@ fn read_vertex(lines: &mut Lines<'_>) -> Result<Point, PlanFileError> {
     Ok(Point::new(x, y))
 }
 
+fn read_sequence(lines: &mut Lines<'_>) -> Result<Vec<f64>, PlanFileError> {
+    let line = lines.next("a sequence of voltages")?;
+    line.split_whitespace().map(|field| lines.parse(field, "a voltage in V")).collect()
+}
+
 fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
     let line = lines.next("a segment")?;
     let mut fields = line.split_whitespace();
@@ -196,9 +211,17 @@ fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
             let vertex = lines.field(&mut fields, "a vertex")?;
             return Ok(Segment { mark_index, n_ticks, motion: Motion::Hold { vertex } });
         }
+        "jump" => {
+            let motion = Motion::Jump {
+                from_vertex: lines.field(&mut fields, "a vertex")?,
+                to_vertex: lines.field(&mut fields, "a vertex")?,
+                sequence: lines.field(&mut fields, "a sequence's index")?,
+            };
+            return Ok(Segment { mark_index, n_ticks, motion });
+        }
         "travel" => Interpolation::Absolute,
         "dda" => Interpolation::Dda,
-        other => return Err(lines.error("hold, travel or dda", other)),
+        other => return Err(lines.error("hold, travel, dda or jump", other)),
     };
     let motion = Motion::Travel {
         first_vertex: lines.field(&mut fields, "a vertex")?,

@@ -19,6 +19,8 @@ pub struct PlanDraft {
     pub marks: Vec<PlannedMark>,
     /// Vertices of all paths, field mm; segments refer to ranges of it.
     pub vertices: Vec<Point>,
+    /// Voltages that planned jumps are scaled from, V, one per tick; jumps refer to them by index.
+    pub sequences_v: Vec<Vec<f64>>,
     /// Motion from the first sample on, without a gap.
     pub segments: Vec<Segment>,
 }
@@ -28,6 +30,8 @@ pub struct PlanDraft {
 pub enum Planner {
     /// What RTC- and EZCAD-type controllers do.
     Classic,
+    /// Jumps at the limit of motors and resonance.
+    Optimal,
 }
 
 impl Planner {
@@ -35,6 +39,7 @@ impl Planner {
     pub fn name(self) -> &'static str {
         match self {
             Self::Classic => "classic",
+            Self::Optimal => "optimal",
         }
     }
 }
@@ -87,6 +92,17 @@ pub enum Motion {
         /// How samples are computed.
         interpolation: Interpolation,
     },
+    /// Goes from rest to rest by voltages, the same sequence on both axes, each with the factor
+    /// that takes it from angle to angle. Sample j (from 1) is the reference for which the nominal
+    /// servo applies voltage j of the sequence in the tick that follows.
+    Jump {
+        /// Index of the vertex it starts on.
+        from_vertex: u32,
+        /// Index of the vertex it ends on.
+        to_vertex: u32,
+        /// Index into [`PlanDraft::sequences_v`]; as many voltages as the segment has samples.
+        sequence: u32,
+    },
 }
 
 /// A trapezoid of speed along a path; infinite accelerations are constant speed at once.
@@ -115,6 +131,7 @@ impl Motion {
         match *self {
             Self::Hold { vertex } => vertex as usize,
             Self::Travel { first_vertex, .. } => first_vertex as usize,
+            Self::Jump { from_vertex, .. } => from_vertex as usize,
         }
     }
 
@@ -125,6 +142,7 @@ impl Motion {
             Self::Travel { first_vertex, n_vertices, .. } => {
                 first_vertex as usize + n_vertices as usize - 1
             }
+            Self::Jump { to_vertex, .. } => to_vertex as usize,
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Small, separate, and without the planner's code: it walks the segments by itself, takes every
 //! sample through the exact optics and the nominal servo and motor, and looks at what comes out.
 
+mod jump;
 mod light;
 mod walk;
 
@@ -14,7 +15,7 @@ use ftheta_model::machine::Machine;
 use ftheta_model::plan::PlanDraft;
 use ftheta_model::space::FieldPoint;
 use thiserror::Error;
-use walk::Walk;
+use walk::{Command, Walk};
 
 /// This share of the commanded angle and of the mirror's speed stays free for a correction table,
 /// which is applied after the audit. Not quite 3 %: the corners of the presets' fields take up to
@@ -138,10 +139,11 @@ pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
     let scanner = &draft.machine.scanner;
     let gains = Gains::design(scanner, draft.machine.output.period_s())?;
     light::check_light(draft, gains.lag_s(&Galvo::new(scanner)))?;
-    let mut walk = Walk::new(draft);
+    jump::check_jumps(draft, &gains)?;
+    let mut walk = Walk::new(draft, gains);
     let mut meter = Meter::new(draft, gains);
-    while let Some((place, segment_index)) = walk.next() {
-        meter.sample(draft, place, segment_index)?;
+    while let Some((command, segment_index)) = walk.next() {
+        meter.sample(draft, command, segment_index)?;
     }
     Ok(meter.limits)
 }
@@ -177,13 +179,18 @@ impl Meter {
     fn sample(
         &mut self,
         draft: &PlanDraft,
-        place: FieldPoint,
+        command: Command,
         segment_index: usize,
     ) -> Result<(), AuditError> {
         let where_ = || describe(draft, segment_index, self.n_samples);
-        let angles = angles_from_field(&draft.machine.optics, place).ok_or_else(|| {
-            AuditError::Unreachable { place: where_(), x_mm: place.x_mm, y_mm: place.y_mm }
-        })?;
+        let angles = match command {
+            Command::Angles(angles) => angles,
+            Command::Place(place) => {
+                angles_from_field(&draft.machine.optics, place).ok_or_else(|| {
+                    AuditError::Unreachable { place: where_(), x_mm: place.x_mm, y_mm: place.y_mm }
+                })?
+            }
+        };
         let scanner = &draft.machine.scanner;
         let commanded_rad = angles.x_rad.abs().max(angles.y_rad.abs());
         let commanded = commanded_rad / scanner.angle_max_rad;

@@ -80,6 +80,10 @@ impl PlanId {
             hash.number(mark.power_w);
         }
         draft.vertices.iter().for_each(|&vertex| hash.point(vertex));
+        for sequence in &draft.sequences_v {
+            hash.count(sequence.len() as u64);
+            sequence.iter().for_each(|&voltage| hash.number(voltage));
+        }
         for segment in &draft.segments {
             hash.count(segment.mark_index.map_or(u64::MAX, u64::from));
             hash.count(u64::from(segment.n_ticks));
@@ -144,6 +148,10 @@ impl Feed {
                 self.number(profile.acceleration_mm_s2);
                 self.number(profile.deceleration_mm_s2);
                 self.count(u64::from(interpolation == Interpolation::Dda));
+            }
+            Motion::Jump { from_vertex, to_vertex, sequence } => {
+                self.count(2);
+                [from_vertex, to_vertex, sequence].map(|index| self.count(u64::from(index)));
             }
         }
     }

@@ -127,6 +127,20 @@ impl Gains {
         }
     }
 
+    /// The reference for which the servo applies a voltage in the next tick, rad: the servo's law,
+    /// solved for it. `None` for a servo whose memory would outlast the motion.
+    ///
+    /// * `state`: the axis now
+    /// * `acting_v`: voltage acting until the next tick, V
+    /// * `next_v`: voltage wanted then, V
+    pub fn reference_rad(&self, state: &State, acting_v: f64, next_v: f64) -> Option<f64> {
+        let Self::StateFeedback { k0, k, .. } = self else {
+            return None;
+        };
+        let feedback_v: f64 = state.iter().zip(k.iter()).map(|(value, gain)| value * gain).sum();
+        Some((next_v + feedback_v + k[5] * acting_v) / k0)
+    }
+
     /// How many values of a [`Memory`] the servo uses; a value it does not use would stand in the
     /// closed loop as a state that never decays.
     pub(crate) fn n_memories(&self) -> usize {

@@ -1,5 +1,6 @@
 //! Why a toolpath cannot be planned.
 
+use crate::jump::JumpError;
 use ftheta_physics::audit::AuditError;
 use ftheta_physics::servo::ServoError;
 use thiserror::Error;
@@ -64,6 +65,9 @@ pub enum PlanError {
         /// Off edge, µs from the first sample.
         off_us: f64,
     },
+    /// The jump atlas cannot be built.
+    #[error(transparent)]
+    Jump(#[from] JumpError),
     /// The nominal servo cannot be built.
     #[error(transparent)]
     Servo(#[from] ServoError),
@@ -93,6 +97,7 @@ impl PlanError {
                 format!("on {on_us} µs, off {off_us} µs"),
                 "0 <= on <= off".into(),
             ),
+            Self::Jump(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Audit(error) => error.fault(),
         }

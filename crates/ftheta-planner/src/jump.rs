@@ -11,7 +11,7 @@ mod limit;
 mod polish;
 mod program;
 
-pub use atlas::{Atlas, AtlasOptions, Jump};
+pub use atlas::{ATLAS_VERSION, Atlas, AtlasOptions, Jump, Level, N_LEVELS};
 pub use axis::{Axis, AxisOptions, CurrentBound, Model, Reach};
 pub use error::JumpError;
 pub use limit::{fewest_ticks, limit_s, settle_limit_s};

@@ -2,9 +2,11 @@
 //!
 //! Deterministic: the same toolpath and machine give the same plan, bit for bit.
 
+mod builder;
 pub mod classic;
 mod error;
 pub mod jump;
+pub mod optimal;
 pub mod render;
 
 pub use error::PlanError;

@@ -4,9 +4,11 @@ use ftheta_model::block::{Block, LaserEdge};
 use ftheta_model::plan::{Motion, SpeedProfile};
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::space::{DacCodes, FieldPoint};
+use ftheta_physics::galvo::{Galvo, State};
 use ftheta_physics::map_table::MapTable;
 use ftheta_physics::optics::angles_from_field;
 use ftheta_physics::plan::Plan;
+use ftheta_physics::servo::Gains;
 use kurbo::{Point, Vec2};
 
 /// Samples of a block.
@@ -23,6 +25,7 @@ const DDA_FRACTION: f64 = 1.0 / 256.0;
 pub struct Renderer<'a> {
     plan: &'a Plan,
     words: Words<'a>,
+    jumps: Vec<JumpShape>,
     segment_index: usize,
     /// Samples of the segment already rendered.
     n_rendered: u32,
@@ -30,6 +33,15 @@ pub struct Renderer<'a> {
     next_index: u64,
     /// Laser edges already given: two per mark.
     n_edges: usize,
+}
+
+/// The references of one sequence.
+#[derive(Clone)]
+struct JumpShape {
+    /// Where it leads, rad.
+    step_rad: f64,
+    /// References of its ticks at a factor of one, rad from the start.
+    references_rad: Vec<f64>,
 }
 
 /// The state of a walk along a path.
@@ -63,7 +75,17 @@ impl<'a> Renderer<'a> {
         });
         let words = Words { plan, table, words_per_rad: 1.0 / output.word_step_rad() };
         let cursor = Cursor::at(&plan.vertices, 0);
-        Self { plan, words, segment_index: 0, n_rendered: 0, cursor, next_index: 0, n_edges: 0 }
+        let jumps = jump_shapes(plan);
+        Self {
+            plan,
+            words,
+            jumps,
+            segment_index: 0,
+            n_rendered: 0,
+            cursor,
+            next_index: 0,
+            n_edges: 0,
+        }
     }
 
     /// Fills `block` with what comes next; `false` after the end.
@@ -100,6 +122,17 @@ impl<'a> Renderer<'a> {
             Motion::Hold { vertex } => {
                 let word = self.words.at(self.plan.vertices[vertex as usize]);
                 words.resize(words.len() + (end + 1 - first) as usize, word);
+            }
+            Motion::Jump { from_vertex, to_vertex, sequence } => {
+                let place = |vertex: u32| self.words.exact(self.plan.vertices[vertex as usize]);
+                let (from, to) = (place(from_vertex), place(to_vertex));
+                let JumpShape { step_rad, references_rad } = &self.jumps[sequence as usize];
+                let factors = [(to[0] - from[0]) / step_rad, (to[1] - from[1]) / step_rad];
+                let references = &references_rad[(first - 1) as usize..end as usize];
+                words.extend(references.iter().map(|reference| {
+                    let angle = |axis: usize| from[axis] + factors[axis] * reference;
+                    self.words.rounded([angle(0), angle(1)])
+                }));
             }
             Motion::Travel { profile, interpolation: Interpolation::Dda, .. } => {
                 let (start, step) = self.dda(&profile, n_ticks);
@@ -193,7 +226,12 @@ impl Words<'_> {
     #[inline]
     fn at(&self, place: Point) -> DacCodes {
         let tabled = self.table.as_ref().and_then(|table| table.value(place.x, place.y));
-        let [x_rad, y_rad] = tabled.unwrap_or_else(|| self.exact(place));
+        self.rounded(tabled.unwrap_or_else(|| self.exact(place)))
+    }
+
+    /// The word pair for angles, rad.
+    #[inline]
+    fn rounded(&self, [x_rad, y_rad]: [f64; 2]) -> DacCodes {
         DacCodes {
             x: (x_rad * self.words_per_rad).round_ties_even() as i32,
             y: (y_rad * self.words_per_rad).round_ties_even() as i32,
@@ -207,4 +245,42 @@ impl Words<'_> {
             .map(|angles| [angles.x_rad, angles.y_rad])
             .expect("the audit has reached every place of the plan")
     }
+}
+
+/// The references of every sequence of a plan.
+fn jump_shapes(plan: &Plan) -> Vec<JumpShape> {
+    let (scanner, tick_s) = (&plan.machine.scanner, plan.machine.output.period_s());
+    let galvo = Galvo::new(scanner);
+    let Ok(gains) = Gains::design(scanner, tick_s) else {
+        // The audit has built the same servo.
+        return Vec::new();
+    };
+    let shape = |sequence_v: &Vec<f64>| JumpShape {
+        step_rad: sequence_v.iter().sum::<f64>() * tick_s / galvo.torque_constant,
+        references_rad: references_rad(sequence_v, &galvo, &gains, tick_s),
+    };
+    plan.sequences_v.iter().map(shape).collect()
+}
+
+/// The references for which the nominal servo applies these voltages from rest, rad from the start:
+/// reference k is sent one tick before voltage k acts.
+///
+/// Source: `design/control.md` C, set-up b.
+pub(crate) fn references_rad(
+    sequence_v: &[f64],
+    galvo: &Galvo,
+    gains: &Gains,
+    tick_s: f64,
+) -> Vec<f64> {
+    let step = galvo.step(tick_s);
+    let (mut state, mut acting_v) = (State::zeros(), 0.0);
+    sequence_v
+        .iter()
+        .map(|&next_v| {
+            let reference_rad = gains.reference_rad(&state, acting_v, next_v);
+            state = step.a * state + step.b * acting_v;
+            acting_v = next_v;
+            reference_rad.expect("the audit refuses jumps of a servo that has no such reference")
+        })
+        .collect()
 }

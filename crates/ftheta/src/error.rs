@@ -91,6 +91,14 @@ pub enum Error {
     /// A jump cannot be planned.
     #[error(transparent)]
     Jump(#[from] JumpError),
+    /// A planner that this machine does not allow.
+    #[error("planner {planner} is not possible on this machine: {why}")]
+    NoPlanner {
+        /// What was asked for.
+        planner: &'static str,
+        /// Why not.
+        why: &'static str,
+    },
     /// The plan is refused.
     #[error(transparent)]
     Audit(#[from] AuditError),
@@ -145,10 +153,10 @@ impl Error {
             }
             Self::Lay(error) => error.fault(),
             Self::Plan(error) => error.fault(),
-            Self::Jump(JumpError::Parameter { quantity, value, low, high }) => {
-                ((*quantity).into(), value.to_string(), format!("{low} to {high}"))
+            Self::Jump(error) => error.fault(),
+            Self::NoPlanner { planner, why } => {
+                ("--planner".into(), (*planner).into(), (*why).into())
             }
-            Self::Jump(error) => ("jump".into(), error.to_string(), String::new()),
             Self::Audit(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),

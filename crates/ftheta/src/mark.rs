@@ -1,16 +1,21 @@
 //! The main job: a job laid, planned, audited, played on the twin and scored.
 
 use crate::Error;
+use crate::atlas_store::AtlasStore;
 use ftheta_model::block::{Block, SampleSink};
 use ftheta_model::dose::DoseMap;
 use ftheta_model::job::Job;
 use ftheta_model::machine::Machine;
-use ftheta_model::plan::{Motion, PlanDraft};
+use ftheta_model::plan::{Motion, PlanDraft, Planner};
 use ftheta_model::recipe::Recipe;
+use ftheta_model::toolpath::Toolpath;
 use ftheta_model::trace::AxisStates;
 use ftheta_model::warning::{Imported, Warning};
+use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
 use ftheta_planner::classic::{self, Settings};
+use ftheta_planner::jump::{AxisOptions, CurrentBound, Model};
+use ftheta_planner::optimal;
 use ftheta_planner::render::Renderer;
 use ftheta_report::score::{Score, Scorer};
 use ftheta_toolpath::lay::{LayOptions, Order, lay};
@@ -22,6 +27,12 @@ use ftheta_twin::twin::{Twin, TwinOptions};
 pub struct MarkOptions {
     /// Speed of all pens, mm/s; `None` leaves the pens' own.
     pub speed_mm_s: Option<f64>,
+    /// How the motion is planned; `None` is the best that the machine allows.
+    pub planner: Option<Planner>,
+    /// Part of the voltage that planned jumps keep for the servo's feedback.
+    pub reserve: f64,
+    /// Where jump atlases are kept.
+    pub atlas_store: AtlasStore,
     /// Greatest distance of the beam from a mark, mm.
     pub tolerance_mm: f64,
     /// Order of the marks.
@@ -36,11 +47,21 @@ pub struct MarkOptions {
     pub seed: u64,
 }
 
+/// Part of the voltage that planned jumps keep for feedback, unless told otherwise.
+pub const RESERVE: f64 = 0.12;
+
+/// Part of the tolerance that may be left of a jump when a mark begins (`design/control.md`).
+const JUMP_SHARE: f64 = 1.0 / 3.0;
+
 impl Default for MarkOptions {
-    /// Pens' own speed, 10 µm, shortest order, no clipping, no mismatch, no noise, seed 1.
+    /// Pens' own speed, the best planner, 12 % reserve, no store, 10 µm, shortest order, no clipping,
+    /// no mismatch, no noise, seed 1.
     fn default() -> Self {
         Self {
             speed_mm_s: None,
+            planner: None,
+            reserve: RESERVE,
+            atlas_store: AtlasStore::none(),
             tolerance_mm: 0.010,
             order: Order::Shortest,
             clip: false,
@@ -139,7 +160,7 @@ pub fn mark(
     }
     observer(Stage::Plan);
     let settings = Settings::new(machine, &recipe.classic)?;
-    let draft = classic::draft(toolpath, machine, &settings, options.tolerance_mm)?;
+    let draft = draft(toolpath, machine, &settings, options, &mut warnings)?;
     observer(Stage::Audit);
     let plan = Plan::new(draft)?;
     let Played { score, dose, states } = play(&plan, options, observer)?;
@@ -147,6 +168,38 @@ pub fn mark(
     let times = plan_times(&plan);
     let seed = options.seed;
     Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
+}
+
+/// The plan's content by the planner asked for, or the best that the machine allows.
+fn draft(
+    toolpath: Toolpath,
+    machine: &Machine,
+    settings: &Settings,
+    options: &MarkOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<PlanDraft, Error> {
+    let tolerance_mm = options.tolerance_mm;
+    let obstacle = optimal::obstacle(machine);
+    if let (Some(Planner::Optimal), Some(why)) = (options.planner, obstacle) {
+        return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
+    }
+    if options.planner == Some(Planner::Classic) || obstacle.is_some() {
+        return Ok(classic::draft(toolpath, machine, settings, tolerance_mm)?);
+    }
+    let epsilon_rad = JUMP_SHARE * tolerance_mm / scale_mm_per_rad(&machine.optics);
+    let axis = AxisOptions {
+        model: Model::Robust { epsilon_rad },
+        tick_s: machine.output.period_s(),
+        voltage_reserve: options.reserve,
+        current_bound: CurrentBound::Always,
+    };
+    let mut atlas = options.atlas_store.load(&machine.scanner, axis, warnings)?;
+    let n_kept = atlas.n_sequences();
+    let draft = optimal::draft(toolpath, machine, settings, tolerance_mm, &mut atlas)?;
+    if atlas.n_sequences() > n_kept {
+        options.atlas_store.save(&machine.scanner, &atlas, warnings);
+    }
+    Ok(draft)
 }
 
 /// Stray energy from which on it is worth a warning.
@@ -267,7 +320,9 @@ pub fn plan_times(plan: &PlanDraft) -> PlanTimes {
                     times.marked_mm += profile.length_mm;
                 }
             }
-            (None, Motion::Travel { .. }) => times.n_jumps += usize::from(between),
+            (None, Motion::Travel { .. } | Motion::Jump { .. }) => {
+                times.n_jumps += usize::from(between)
+            }
             (None, Motion::Hold { .. }) if between => {
                 times.delay_s += f64::from(segment.n_ticks) * plan.machine.output.period_s();
             }

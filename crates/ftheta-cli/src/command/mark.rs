@@ -4,6 +4,7 @@ use crate::arguments::Mark;
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::{note, say};
+use ftheta::atlas_store::AtlasStore;
 use ftheta::formats::svg::SvgOptions;
 use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::warning::Warning;
@@ -30,6 +31,9 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let mut output = Output::new(&folder(arguments))?;
     let options = MarkOptions {
         speed_mm_s: arguments.speed,
+        planner: arguments.planner.map(Into::into),
+        reserve: arguments.reserve,
+        atlas_store: AtlasStore::new(arguments.cache.clone()),
         tolerance_mm: arguments.tolerance_um * 1e-3,
         order: arguments.order.into(),
         clip: arguments.clip,

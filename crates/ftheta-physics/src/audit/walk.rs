@@ -1,14 +1,28 @@
 //! Walks a plan's segments sample by sample, from their definition alone.
 
 use super::AuditError;
-use ftheta_model::plan::{Motion, PlanDraft};
+use super::jump::JumpWalk;
+use crate::galvo::Galvo;
+use crate::servo::Gains;
+use ftheta_model::plan::{Motion, PlanDraft, Segment};
 use ftheta_model::recipe::Interpolation;
-use ftheta_model::space::FieldPoint;
+use ftheta_model::space::{FieldPoint, MirrorAngles};
 use kurbo::Point;
 
-/// Yields the commanded place of every sample, and the segment it belongs to.
+/// What a sample commands.
+pub enum Command {
+    /// The angles of a place.
+    Place(FieldPoint),
+    /// Angles themselves.
+    Angles(MirrorAngles),
+}
+
+/// Yields the command of every sample, and the segment it belongs to.
 pub struct Walk<'a> {
     draft: &'a PlanDraft,
+    gains: Gains,
+    galvo: Galvo,
+    jump: Option<JumpWalk<'a>>,
     segment_index: usize,
     /// Samples of the segment already given.
     n_given: u32,
@@ -19,30 +33,40 @@ pub struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     /// Starts at the first sample.
-    pub fn new(draft: &'a PlanDraft) -> Self {
-        let mut walk = Self { draft, segment_index: 0, n_given: 0, leg: 0, leg_start_mm: 0.0 };
+    pub fn new(draft: &'a PlanDraft, gains: Gains) -> Self {
+        let galvo = Galvo::new(&draft.machine.scanner);
+        let (segment_index, n_given, leg, leg_start_mm) = (0, 0, 0, 0.0);
+        let mut walk =
+            Self { draft, gains, galvo, jump: None, segment_index, n_given, leg, leg_start_mm };
         walk.enter();
         walk
     }
 
     /// The next sample, or `None` after the last.
-    pub fn next(&mut self) -> Option<(FieldPoint, usize)> {
+    pub fn next(&mut self) -> Option<(Command, usize)> {
         let segment = self.draft.segments.get(self.segment_index)?;
         let index = self.segment_index;
         self.n_given += 1;
-        let place = self.place(&segment.motion, self.n_given == segment.n_ticks);
+        let command = match &mut self.jump {
+            Some(jump) => Command::Angles(jump.next()),
+            None => {
+                let last = self.n_given == segment.n_ticks;
+                Command::Place(self.place(&segment.motion, last).into())
+            }
+        };
         if self.n_given == segment.n_ticks {
             self.segment_index += 1;
             self.n_given = 0;
             self.enter();
         }
-        Some((place.into(), index))
+        Some((command, index))
     }
 
     fn enter(&mut self) {
         self.leg_start_mm = 0.0;
         if let Some(segment) = self.draft.segments.get(self.segment_index) {
             self.leg = segment.motion.first_vertex();
+            self.jump = JumpWalk::new(self.draft, &segment.motion, &self.gains, &self.galvo);
         }
     }
 
@@ -96,10 +120,31 @@ pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
             return Err(malformed(place(), "its vertices do not exist"));
         }
         check_profile(draft, &segment.motion).map_err(|what| malformed(place(), what))?;
+        if let Motion::Jump { sequence, .. } = segment.motion {
+            check_sequence(draft, sequence, segment).map_err(|what| malformed(place(), what))?;
+        }
         if draft.vertices[segment.motion.first_vertex()] != at {
             return Err(malformed(place(), "it does not start where the one before ends"));
         }
         at = draft.vertices[segment.motion.last_vertex()];
+    }
+    Ok(())
+}
+
+/// Checks that a jump's sequence is there, as long as the segment, and leads somewhere.
+fn check_sequence(draft: &PlanDraft, index: u32, segment: &Segment) -> Result<(), &'static str> {
+    let Some(sequence_v) = draft.sequences_v.get(index as usize) else {
+        return Err("its sequence does not exist");
+    };
+    if sequence_v.len() != segment.n_ticks as usize {
+        return Err("its sequence is not as long as its samples");
+    }
+    let sum_v: f64 = sequence_v.iter().sum();
+    if !sum_v.is_finite() || sum_v == 0.0 {
+        return Err("its sequence leads nowhere");
+    }
+    if segment.mark_index.is_some() {
+        return Err("a jump cannot belong to a mark");
     }
     Ok(())
 }

@@ -96,17 +96,17 @@ impl Settings {
     }
 
     /// Rest before the first motion: a tick, and as long as a laser-on edge may come early, s.
-    pub(super) fn lead_in_s(&self, period_s: f64) -> f64 {
+    pub(crate) fn lead_in_s(&self, period_s: f64) -> f64 {
         2.0 * period_s + (-self.laser_on_delay_ns).max(0) as f64 * 1e-9
     }
 
     /// Rest after the last jump: until the mirror has arrived and light has ended, s.
-    pub(super) fn lead_out_s(&self) -> f64 {
+    pub(crate) fn lead_out_s(&self) -> f64 {
         4.0 * self.jump_delay_s.max(1e-4) + self.laser_off_delay_ns.max(0) as f64 * 1e-9
     }
 
     /// Checks every value against what the machine and good sense allow.
-    pub(super) fn check(&self, machine: &Machine) -> Result<(), PlanError> {
+    pub(crate) fn check(&self, machine: &Machine) -> Result<(), PlanError> {
         let fastest_mm_s = fastest_mm_s(machine);
         let nanosecond = 1e-9;
         let rows = [
@@ -146,7 +146,7 @@ fn fastest_mm_s(machine: &Machine) -> f64 {
 }
 
 /// Checks a pen's speed and power against the machine.
-pub(super) fn check_pen(pen: &Pen, machine: &Machine) -> Result<(), PlanError> {
+pub(crate) fn check_pen(pen: &Pen, machine: &Machine) -> Result<(), PlanError> {
     let place = format!("pen \"{}\"", pen.name);
     let range = (1e-3, fastest_mm_s(machine));
     check_range(&place, "mark_speed", pen.mark_speed_mm_s, range, "mm/s")?;

@@ -1,4 +1,5 @@
-//! The jump atlas: for every number of ticks the longest step and its voltages.
+//! The jump atlas: for every number of ticks the longest step and its voltages, at three levels of
+//! heat.
 
 use super::{Axis, AxisOptions, JumpError, Reach};
 use ftheta_model::machine::Scanner;
@@ -11,6 +12,13 @@ use std::thread;
 const N_BATCH: usize = 8;
 /// Greatest number of ticks.
 const N_TICKS_MAX: usize = 20_000;
+/// Part of the longest step of a number of ticks that each level covers. Time grows like the root
+/// of the step: 5 and 20 % more of it leave 0.8 and 0.5 of the heat (`design/control.md` B).
+const LEVELS: [f64; N_LEVELS] = [1.0, 0.9, 0.69];
+/// Raised when other voltages come out for the same parameters.
+pub const ATLAS_VERSION: u32 = 1;
+/// Number of levels.
+pub const N_LEVELS: usize = 3;
 
 /// What the atlas covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,12 +30,20 @@ pub struct AtlasOptions {
 }
 
 /// For every number of ticks the longest step and its voltages.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Atlas {
-    options: AtlasOptions,
-    /// Index is the number of ticks; steps never fall.
-    steps_rad: Vec<f64>,
-    sequences_v: Vec<Vec<f64>>,
+    options: AxisOptions,
+    axis: Axis,
+    levels: [Level; N_LEVELS],
+}
+
+/// The steps and voltages of one level; the index is the number of ticks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Longest step of each number of ticks, rad; they never fall.
+    pub steps_rad: Vec<f64>,
+    /// Voltages of that step, V.
+    pub sequences_v: Vec<Vec<f64>>,
 }
 
 /// A jump: a sequence of the atlas and the factor on it.
@@ -57,34 +73,17 @@ impl Jump<'_> {
     }
 }
 
-impl Atlas {
-    /// Builds the atlas of this scanner; the same for any number of processors.
-    ///
-    /// # Errors
-    /// If a parameter is out of range or a linear program fails.
-    pub fn build(scanner: &Scanner, options: AtlasOptions) -> Result<Self, JumpError> {
-        let (low, high) = (1e-9, 4.0);
-        let value = options.range_rad;
-        if !(low..=high).contains(&value) {
-            return Err(JumpError::Parameter { quantity: "step range rad", value, low, high });
-        }
-        let axis = Axis::new(scanner, options.axis)?;
-        let mut atlas = Self { options, steps_rad: vec![0.0], sequences_v: vec![Vec::new()] };
-        while atlas.reach_rad() < value {
-            let first = atlas.steps_rad.len();
-            if first > N_TICKS_MAX {
-                let tick_us = options.axis.tick_s * 1e6;
-                return Err(JumpError::TooLong { step_rad: value, limit: N_TICKS_MAX, tick_us });
-            }
-            for reach in batch(&axis, first) {
-                // What lies beyond the range is dropped, errors with it, so that the batch does
-                // not show in the result.
-                if atlas.reach_rad() < value {
-                    atlas.push(reach?);
-                }
-            }
-        }
-        Ok(atlas)
+impl Default for Level {
+    /// No ticks, no way.
+    fn default() -> Self {
+        Self { steps_rad: vec![0.0], sequences_v: vec![Vec::new()] }
+    }
+}
+
+impl Level {
+    /// Longest step, rad.
+    fn reach_rad(&self) -> f64 {
+        self.steps_rad.last().copied().unwrap_or(0.0)
     }
 
     /// Adds one more tick.
@@ -103,63 +102,181 @@ impl Atlas {
         self.sequences_v.push(sequence_v);
     }
 
+    /// Whether every number of ticks has its step and voltages.
+    fn is_whole(&self) -> bool {
+        let lengths = self.sequences_v.iter().enumerate().all(|(n, v)| v.len() == n);
+        let finite =
+            self.sequences_v.iter().flatten().chain(&self.steps_rad).all(|v| v.is_finite());
+        self.steps_rad.len() == self.sequences_v.len()
+            && self.steps_rad.first() == Some(&0.0)
+            && self.steps_rad.is_sorted()
+            && lengths
+            && finite
+    }
+}
+
+impl Atlas {
+    /// Builds the atlas of this scanner; the same for any number of processors.
+    ///
+    /// # Errors
+    /// If a parameter is out of range or a linear program fails.
+    pub fn build(scanner: &Scanner, options: AtlasOptions) -> Result<Self, JumpError> {
+        let mut atlas = Self::restore(scanner, options.axis, Default::default())?;
+        atlas.extend(0, options.range_rad)?;
+        Ok(atlas)
+    }
+
+    /// The atlas with the levels that an earlier one has kept, as far as they are whole.
+    ///
+    /// # Errors
+    /// If a parameter is out of range.
+    pub fn restore(
+        scanner: &Scanner,
+        options: AxisOptions,
+        levels: [Level; N_LEVELS],
+    ) -> Result<Self, JumpError> {
+        let axis = Axis::new(scanner, options)?;
+        let whole = |level: Level| if level.is_whole() { level } else { Level::default() };
+        Ok(Self { options, axis, levels: levels.map(whole) })
+    }
+
+    /// Makes a level cover steps up to this one; returns whether it had to be extended.
+    ///
+    /// # Errors
+    /// If the step is out of range or a program fails; what was solved before stays.
+    pub fn extend(&mut self, level: usize, step_rad: f64) -> Result<bool, JumpError> {
+        let (low, high) = (0.0, 4.0);
+        if !(low..=high).contains(&step_rad) {
+            let quantity = "step range rad";
+            return Err(JumpError::Parameter { quantity, value: step_rad, low, high });
+        }
+        if level > 0 {
+            self.extend(0, step_rad / LEVELS[level])?;
+        }
+        self.extend_while(level, |built| built.reach_rad() < step_rad)
+    }
+
+    /// Makes a level cover so many ticks; returns whether it had to be extended.
+    ///
+    /// # Errors
+    /// As [`Self::extend`].
+    pub fn extend_ticks(&mut self, level: usize, n_ticks: usize) -> Result<bool, JumpError> {
+        let short = |built: &Level| built.steps_rad.len() <= n_ticks;
+        if level > 0 {
+            self.extend_while(0, short)?;
+        }
+        self.extend_while(level, short)
+    }
+
+    fn extend_while(
+        &mut self,
+        level: usize,
+        is_short: impl Fn(&Level) -> bool,
+    ) -> Result<bool, JumpError> {
+        let mut extended = false;
+        while is_short(&self.levels[level]) {
+            extended = true;
+            let first = self.levels[level].steps_rad.len();
+            if first > N_TICKS_MAX {
+                let (step_rad, tick_us) = (self.reach_rad(), self.options.tick_s * 1e6);
+                return Err(JumpError::TooLong { step_rad, limit: N_TICKS_MAX, tick_us });
+            }
+            for reach in self.batch(level, first) {
+                // What lies beyond the range is dropped, errors with it, so that the batch does
+                // not show in the result.
+                if is_short(&self.levels[level]) {
+                    self.levels[level].push(reach?);
+                }
+            }
+        }
+        Ok(extended)
+    }
+
     /// The jump in the fewest ticks; `None` beyond the range.
     ///
     /// Exact by linearity: the end stays at rest and every limit holds with the factor.
     pub fn jump(&self, step_rad: f64) -> Option<Jump<'_>> {
+        self.jump_at(0, step_rad, 0)
+    }
+
+    /// The jump of this level in the fewest ticks, at least so many; `None` beyond the range.
+    pub fn jump_at(&self, level: usize, step_rad: f64, n_ticks_min: usize) -> Option<Jump<'_>> {
         let distance = step_rad.abs();
         if !distance.is_finite() {
             return None;
         }
-        let n_ticks = self.steps_rad.partition_point(|&reach| reach < distance);
-        let reach = *self.steps_rad.get(n_ticks)?;
+        let Level { steps_rad, sequences_v } = &self.levels[level];
+        let n_ticks = steps_rad.partition_point(|&reach| reach < distance).max(n_ticks_min);
+        let reach = *steps_rad.get(n_ticks)?;
         let scale = if reach > 0.0 { step_rad / reach } else { 0.0 };
-        Some(Jump { n_ticks, sequence: &self.sequences_v[n_ticks], scale })
+        Some(Jump { n_ticks, sequence: &sequences_v[n_ticks], scale })
     }
 
     /// Longest step, rad.
     pub fn reach_rad(&self) -> f64 {
-        self.steps_rad.last().copied().unwrap_or(0.0)
+        self.levels[0].reach_rad()
     }
 
     /// Longest step of each number of ticks, rad; the index is the number.
     pub fn steps_rad(&self) -> &[f64] {
-        &self.steps_rad
+        &self.levels[0].steps_rad
     }
 
     /// Voltages of the longest step of each number of ticks, V; the index is the number.
     pub fn sequences_v(&self) -> &[Vec<f64>] {
-        &self.sequences_v
+        &self.levels[0].sequences_v
     }
 
     /// What the atlas was built for.
-    pub fn options(&self) -> AtlasOptions {
+    pub fn axis_options(&self) -> AxisOptions {
         self.options
     }
-}
 
-/// The longest steps of the next numbers of ticks, in order.
-fn batch(axis: &Axis, first: usize) -> Vec<Result<Option<Reach>, JumpError>> {
-    let n_threads = thread::available_parallelism().map_or(1, NonZero::get).min(N_BATCH);
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(vec![Ok(None); N_BATCH]);
-    let work = || {
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= N_BATCH {
-                break;
+    /// How many sequences have been solved, of all levels.
+    pub fn n_sequences(&self) -> usize {
+        self.levels.iter().map(|level| level.sequences_v.len()).sum()
+    }
+
+    /// All levels, to be kept.
+    pub fn levels(&self) -> &[Level; N_LEVELS] {
+        &self.levels
+    }
+
+    /// The longest steps of the next numbers of ticks, in order.
+    fn batch(&self, level: usize, first: usize) -> Vec<Result<Option<Reach>, JumpError>> {
+        let n_threads = thread::available_parallelism().map_or(1, NonZero::get).min(N_BATCH);
+        let next = AtomicUsize::new(0);
+        let results = Mutex::new(vec![Ok(None); N_BATCH]);
+        let work = || {
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                if index >= N_BATCH {
+                    break;
+                }
+                // The largest first, so that no thread is left alone with it.
+                let index = N_BATCH - 1 - index;
+                let reach = self.solve(level, first + index);
+                results.lock().unwrap_or_else(PoisonError::into_inner)[index] = reach;
             }
-            // The largest first, so that no thread is left alone with it.
-            let index = N_BATCH - 1 - index;
-            let reach = axis.longest(first + index);
-            results.lock().unwrap_or_else(PoisonError::into_inner)[index] = reach;
+        };
+        thread::scope(|scope| {
+            for _ in 1..n_threads {
+                scope.spawn(work);
+            }
+            work();
+        });
+        results.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn solve(&self, level: usize, n_ticks: usize) -> Result<Option<Reach>, JumpError> {
+        if level == 0 {
+            return self.axis.longest(n_ticks);
         }
-    };
-    thread::scope(|scope| {
-        for _ in 1..n_threads {
-            scope.spawn(work);
+        let steps_rad = self.steps_rad();
+        let longest_rad = steps_rad.get(n_ticks).copied().unwrap_or(self.reach_rad());
+        if longest_rad == 0.0 {
+            return Ok(None);
         }
-        work();
-    });
-    results.into_inner().unwrap_or_else(PoisonError::into_inner)
+        self.axis.coolest(n_ticks, LEVELS[level] * longest_rad)
+    }
 }

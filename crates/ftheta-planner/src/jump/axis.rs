@@ -183,6 +183,19 @@ impl Axis {
         Ok(found.map(|(step_rad, voltages_v)| Reach { step_rad, voltages_v }))
     }
 
+    /// The voltages that take a step in this many ticks with the least heat in the coil.
+    ///
+    /// * `step_rad`: within the longest step of so many ticks
+    ///
+    /// # Errors
+    /// If the quadratic program cannot be solved.
+    pub fn coolest(&self, n_ticks: usize, step_rad: f64) -> Result<Option<Reach>, JumpError> {
+        let goal = Goal::Coolest(step_rad);
+        let request = Request { n_ticks, ends: Ends::rest(), goal, way: Way::Free };
+        let found = self.best(&request)?;
+        Ok(found.map(|(step_rad, voltages_v)| Reach { step_rad, voltages_v }))
+    }
+
     /// The factor on the request's ends and the voltages, exact; `None` if nothing is reached.
     pub(super) fn best(&self, request: &Request) -> Result<Option<(f64, Vec<f64>)>, JumpError> {
         // Every state that counts must be met, and one voltage sets the scale.

@@ -39,3 +39,20 @@ pub enum JumpError {
         tick_us: f64,
     },
 }
+
+impl JumpError {
+    /// Place, value and limit for a machine-readable message.
+    pub fn fault(&self) -> (String, String, String) {
+        match self {
+            Self::Parameter { quantity, value, low, high } => {
+                ((*quantity).into(), value.to_string(), format!("{low} to {high}"))
+            }
+            Self::Unsolved { n_ticks, status, .. } => {
+                (format!("jump of {n_ticks} ticks"), status.clone(), "a solution".into())
+            }
+            Self::TooLong { step_rad, limit, .. } => {
+                ("jump".into(), format!("{step_rad} rad"), format!("{limit} ticks"))
+            }
+        }
+    }
+}

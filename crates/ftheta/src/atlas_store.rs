@@ -1,0 +1,121 @@
+//! Jump atlases kept on disk between runs, one file for each machine and setting.
+
+use crate::Error;
+use ftheta_formats::atlas_file::{self, AtlasKey, AtlasLevel};
+use ftheta_model::machine::Scanner;
+use ftheta_model::warning::Warning;
+use ftheta_planner::jump::{ATLAS_VERSION, Atlas, AxisOptions, Level};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// The folder that atlases are kept in; without one they are built anew each time.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AtlasStore {
+    folder: Option<PathBuf>,
+}
+
+impl AtlasStore {
+    /// The store in this folder, or in the platform's cache folder.
+    pub fn new(folder: Option<PathBuf>) -> Self {
+        let platform = || dirs::cache_dir().map(|cache| cache.join("ftheta"));
+        Self { folder: folder.or_else(platform) }
+    }
+
+    /// No store: nothing is read or kept.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// The atlas of a scanner as far as it has been built; a file that cannot be used is as good as
+    /// none, with a warning.
+    ///
+    /// # Errors
+    /// If a parameter of the scanner is out of range.
+    pub fn load(
+        &self,
+        scanner: &Scanner,
+        axis: AxisOptions,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Atlas, Error> {
+        let mut levels: [Level; _] = Default::default();
+        if let Some(path) = self.path(scanner, axis) {
+            match read(&path, key(scanner, axis)) {
+                Ok(kept) => levels.iter_mut().zip(kept).for_each(|(level, kept)| {
+                    let AtlasLevel { steps_rad, sequences_v } = kept;
+                    *level = Level { steps_rad, sequences_v };
+                }),
+                Err(None) => {}
+                Err(Some(why)) => warnings.push(Warning::new(
+                    "atlas",
+                    format!("{}: {why}; the atlas is built anew", path.display()),
+                )),
+            }
+        }
+        Ok(Atlas::restore(scanner, axis, levels)?)
+    }
+
+    /// Keeps an atlas. It is written beside its place and renamed, so that a reader finds all of it
+    /// or none, whoever writes at the same time; of two writers the last one stays.
+    ///
+    /// A folder that cannot be written to costs time in the next run, nothing else: a warning.
+    pub fn save(&self, scanner: &Scanner, atlas: &Atlas, warnings: &mut Vec<Warning>) {
+        let axis = atlas.axis_options();
+        let (Some(folder), Some(path)) = (&self.folder, self.path(scanner, axis)) else {
+            return;
+        };
+        let levels: Vec<AtlasLevel> = atlas
+            .levels()
+            .iter()
+            .map(|Level { steps_rad, sequences_v }| AtlasLevel {
+                steps_rad: steps_rad.clone(),
+                sequences_v: sequences_v.clone(),
+            })
+            .collect();
+        let bytes = atlas_file::write(key(scanner, axis), &levels);
+        if let Err(error) = publish(folder, &path, &bytes) {
+            let message = format!("{}: cannot be kept: {error}", path.display());
+            warnings.push(Warning::new("atlas", message));
+        }
+    }
+
+    fn path(&self, scanner: &Scanner, axis: AxisOptions) -> Option<PathBuf> {
+        let name = key(scanner, axis).file_name();
+        self.folder.as_ref().map(|folder| folder.join(name))
+    }
+}
+
+/// The levels in a file; `None` where there is no file, else why it cannot be used.
+fn read(path: &Path, key: AtlasKey) -> Result<Vec<AtlasLevel>, Option<String>> {
+    let bytes = fs::read(path).map_err(|error| {
+        (error.kind() != io::ErrorKind::NotFound).then(|| format!("cannot be read: {error}"))
+    })?;
+    atlas_file::read(&bytes, key).map_err(|error| Some(error.to_string()))
+}
+
+fn publish(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let mut file = NamedTempFile::new_in(folder)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}
+
+/// Everything that decides an atlas: numbers as their shortest text that reads back the same.
+fn key(scanner: &Scanner, axis: AxisOptions) -> AtlasKey {
+    let numbers = [
+        scanner.rotor_inertia_kg_m2,
+        scanner.mirror_inertia_kg_m2,
+        scanner.torque_constant_n_m_a,
+        scanner.resistance_ohm,
+        scanner.inductance_h,
+        scanner.torsional_mode_hz,
+        scanner.damping_ratio,
+        scanner.voltage_max_v,
+        scanner.current_max_a,
+        scanner.f1_uncertainty,
+    ];
+    AtlasKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?}"))
+}
