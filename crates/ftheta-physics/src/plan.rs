@@ -151,7 +151,7 @@ impl Feed {
             }
             Motion::Jump { from_vertex, to_vertex, sequence } => {
                 self.count(2);
-                [from_vertex, to_vertex, sequence].map(|index| self.count(u64::from(index)));
+                [from_vertex, to_vertex, sequence].iter().for_each(|&n| self.count(u64::from(n)));
             }
         }
     }

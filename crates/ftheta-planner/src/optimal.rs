@@ -17,8 +17,11 @@ use std::collections::BTreeMap;
 
 /// Part of the coil's steady heat that jumps may use: marks need some too.
 const HEAT_SHARE: f64 = 0.95;
-/// Ticks by which a jump may be prolonged so that its commands stay within the field's angles.
-const N_LONGER_MAX: usize = 200;
+/// Near the edge of the angles a jump is prolonged by this part at a time, so that its commands,
+/// which lead the mirror, stay within them.
+const LONGER: f64 = 1.0 / 12.0;
+/// After so many prolongations a jump at constant speed, whose commands never lead, is as good.
+const N_LONGER_MAX: usize = 3;
 
 /// Why jumps of this machine cannot be planned by voltage, if they cannot.
 pub fn obstacle(machine: &Machine) -> Option<&'static str> {
@@ -117,8 +120,9 @@ impl<'a> Jumps<'a> {
         let steps_rad = [end.x_rad - start.x_rad, end.y_rad - start.y_rad];
         let mut best: Option<(usize, usize, usize)> = None;
         for level in 0..N_LEVELS {
+            // What leaves the angles at the first level leaves them at all.
             let Some((n_ticks, rises_a2)) = self.shortest(level, starts_rad, steps_rad)? else {
-                continue;
+                break;
             };
             let Some(n_wait) = self.wait(rises_a2) else {
                 continue;
@@ -148,7 +152,8 @@ impl<'a> Jumps<'a> {
         let free = 1.0 - CORRECTION_RESERVE;
         let angle_max_rad = (free * scanner.angle_max_rad).min(self.machine.output.word_range_rad);
         let speed_max_rad_s = free * scanner.speed_max_rad_s;
-        for n_ticks in first..first + N_LONGER_MAX {
+        for longer in 0..=N_LONGER_MAX {
+            let n_ticks = first + (first as f64 * LONGER * longer as f64).ceil() as usize;
             self.atlas.extend_ticks(level, n_ticks)?;
             let Some(jump) = self.atlas.jump_at(level, distance_rad, n_ticks) else {
                 return Ok(None);

@@ -74,7 +74,7 @@ pub struct Reach {
 }
 
 /// A quantity inside a tick: weights of the states before it, and of its voltage.
-type Weights = (State, f64);
+pub(super) type Weights = (State, f64);
 
 /// One plant whose distance from rest at the end is bounded.
 #[derive(Clone, Copy, Debug)]
@@ -89,19 +89,21 @@ pub(super) struct Plant {
 pub(super) type Look = [State; 3];
 
 impl Plant {
-    /// How a quantity at the end depends on the voltage of each tick, rad/V.
-    pub(super) fn response(&self, mut weights: State, n_ticks: usize) -> Vec<f64> {
-        let mut response = vec![0.0; n_ticks];
-        for value in response.iter_mut().rev() {
-            *value = weights.dot(&self.step.b);
+    /// How the plant's deviation from the nominal axis in a state at the end depends on the nominal
+    /// states and the voltage of each tick.
+    ///
+    /// Deviations, since they are small: the plant's whole motion, as a sum over voltages, would
+    /// lose the end in rounding.
+    pub(super) fn deviation(&self, nominal: &Step, state: usize, n_ticks: usize) -> Vec<Weights> {
+        let mut weights = State::zeros();
+        weights[state] = 1.0;
+        let (a, b) = (self.step.a - nominal.a, self.step.b - nominal.b);
+        let mut ticks = vec![(State::zeros(), 0.0); n_ticks];
+        for tick in ticks.iter_mut().rev() {
+            *tick = (a.transpose() * weights, weights.dot(&b));
             weights = self.step.a.transpose() * weights;
         }
-        response
-    }
-
-    /// By how much the end is missed without any voltage.
-    pub(super) fn missed(&self, n_ticks: usize, start: &State, end: &State) -> State {
-        (0..n_ticks).fold(*start, |state, _| self.step.a * state) - end
+        ticks
     }
 }
 

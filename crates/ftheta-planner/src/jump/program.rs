@@ -18,6 +18,9 @@ const ATTEMPTS: [(bool, f64); 3] = [(true, 1e-7), (true, 1e-8), (false, 1e-7)];
 /// Feasibility and gap, in units of the largest values.
 const TOLERANCE: f64 = 1e-9;
 
+/// States in which a plant's end differs from the nominal one; the angle does not act on anything.
+const DEVIATING: [usize; 4] = [1, 2, 3, 4];
+
 /// What a program is asked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Request {
@@ -137,7 +140,7 @@ impl Rows {
 }
 
 /// Where each variable stands: voltage and then states for each tick, the factor, and for each
-/// uncertain plant what it still has to creep and the size of that.
+/// uncertain plant its deviation from the nominal end, and what it has to creep at each look.
 struct Layout {
     n_ticks: usize,
     n_states: usize,
@@ -158,13 +161,18 @@ impl Layout {
         self.voltage(self.n_ticks)
     }
 
-    /// Column of what a plant has to creep at a look; the next is the size of that.
-    fn creep(&self, plant: usize, look: usize) -> usize {
-        self.factor() + 1 + 2 * (N_LOOKS * plant + look)
+    /// Column of a plant's deviation in this of the [`DEVIATING`] states.
+    fn deviation(&self, plant: usize, position: usize) -> usize {
+        self.factor() + 1 + (DEVIATING.len() + N_LOOKS) * plant + position
+    }
+
+    /// Column of the size of what a plant has to creep at a look.
+    fn creep_size(&self, plant: usize, look: usize) -> usize {
+        self.deviation(plant, DEVIATING.len() + look)
     }
 
     fn n_columns(&self) -> usize {
-        self.creep(self.n_plants, 0)
+        self.deviation(self.n_plants, 0)
     }
 }
 
@@ -188,7 +196,7 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
     let mut program = Program { axis, request, layout, units, rows: Rows::default() };
     program.motion();
     program.ends();
-    program.creeps();
+    program.deviations();
     let n_equal = program.rows.right.len();
     program.bounds();
     program.way();
@@ -309,21 +317,38 @@ impl Program<'_> {
         }
     }
 
-    /// Adds what the plants still have to creep at each look, in units of the bound.
-    fn creeps(&mut self) {
-        for (plant, look) in self.plants_and_looks() {
-            let entries = self.missed(plant, self.axis.plants[plant].looks[look][0]);
-            let creep = (self.layout.creep(plant, look), -1.0);
-            self.rows.add(entries.into_iter().chain([creep]), 0.0);
+    /// Adds how the end of each plant deviates from the nominal one.
+    fn deviations(&mut self) {
+        let Self { axis, request, layout, units, rows } = self;
+        for (plant, one) in axis.plants.iter().enumerate() {
+            for (position, &to) in DEVIATING.iter().enumerate() {
+                let unit = units.state[to];
+                let ticks = one.deviation(&axis.step, to, request.n_ticks);
+                let from_factor = ticks[0].0.dot(&request.ends.start) * units.factor / unit;
+                let mut entries =
+                    vec![(layout.deviation(plant, position), -1.0), (layout.factor(), from_factor)];
+                for (tick, (weights, gain)) in ticks.iter().enumerate() {
+                    entries.push((layout.voltage(tick), gain * units.voltage / unit));
+                    if tick > 0 {
+                        entries.extend(axis.active.iter().enumerate().map(|(position, &from)| {
+                            (layout.state(tick, position), weights[from] * units.state[from] / unit)
+                        }));
+                    }
+                }
+                rows.add(entries, 0.0);
+            }
         }
     }
 
-    /// Adds that the size of each creep is at least the creep, either sign.
+    /// Adds that the size of what each plant has to creep at each look is at least that, either
+    /// sign.
     fn creep_sizes(&mut self) {
         for (plant, look) in self.plants_and_looks() {
-            let creep = self.layout.creep(plant, look);
+            let creep = self.missed(plant, &self.axis.plants[plant].looks[look][0]);
+            let size = (self.layout.creep_size(plant, look), -1.0);
             for sign in [1.0, -1.0] {
-                self.rows.add([(creep, sign), (creep + 1, -1.0)], 0.0);
+                let creep = creep.iter().map(|&(column, weight)| (column, sign * weight));
+                self.rows.add(creep.chain([size]), 0.0);
             }
         }
     }
@@ -332,9 +357,9 @@ impl Program<'_> {
     /// one, in units of the bound.
     fn residuals(&mut self) {
         for (plant, look) in self.plants_and_looks() {
-            self.rows.add([(self.layout.creep(plant, look) + 1, 1.0)], 1.0);
+            self.rows.add([(self.layout.creep_size(plant, look), 1.0)], 1.0);
             for weights in &self.axis.plants[plant].looks[look][1..] {
-                let entries = self.missed(plant, *weights);
+                let entries = self.missed(plant, weights);
                 self.rows.add(entries, 0.0);
             }
         }
@@ -345,16 +370,20 @@ impl Program<'_> {
         (0..n_plants).flat_map(|plant| (0..N_LOOKS).map(move |look| (plant, look)))
     }
 
-    /// By how much a plant misses its end, in units of the bound.
-    fn missed(&self, plant: usize, weights: State) -> Vec<(usize, f64)> {
+    /// By how much a plant misses its end, weighed, in units of the bound.
+    fn missed(&self, plant: usize, weights: &State) -> Vec<(usize, f64)> {
         let Self { axis, layout, units, request, .. } = self;
-        let (plant, bound) = (&axis.plants[plant], axis.residual_max_rad);
-        let gains = plant.response(weights, request.n_ticks);
-        let at = |(tick, gain)| (layout.voltage(tick), gain * units.voltage / bound);
-        let mut entries: Vec<_> = gains.into_iter().enumerate().map(at).collect();
-        let Ends { start, end, .. } = request.ends;
-        let free = weights.dot(&plant.missed(request.n_ticks, &start, &end));
-        entries.push((layout.factor(), free * units.factor / bound));
+        let bound = axis.residual_max_rad;
+        let target = weights.dot(&request.ends.end) * units.factor / bound;
+        let mut entries = vec![(layout.factor(), -target)];
+        for (position, &state) in axis.active.iter().enumerate() {
+            let weight = weights[state] * units.state[state] / bound;
+            entries.push((layout.state(layout.n_ticks, position), weight));
+        }
+        for (position, &state) in DEVIATING.iter().enumerate() {
+            let weight = weights[state] * units.state[state] / bound;
+            entries.push((layout.deviation(plant, position), weight));
+        }
         entries
     }
 
