@@ -6,12 +6,17 @@
 
 mod atlas;
 mod axis;
+mod brake;
 mod error;
+mod fan;
 mod limit;
 mod polish;
 mod program;
+mod transition;
 
 pub use atlas::{ATLAS_VERSION, Atlas, AtlasOptions, Jump, Level, N_LEVELS};
 pub use axis::{Axis, AxisOptions, CurrentBound, Model, Reach};
 pub use error::JumpError;
+pub use fan::Ask;
 pub use limit::{fewest_ticks, limit_s, settle_limit_s};
+pub use transition::{Route, Transition, Transitions};

@@ -256,7 +256,7 @@ pub fn play(
         .scanner
         .sensor
         .noise_rad
-        .hypot(options.noise_mm / ftheta_physics::optics::scale_mm_per_rad(&machine.optics));
+        .hypot(options.noise_mm / scale_mm_per_rad(&machine.optics));
     let mut twin = Twin::new(&machine, &twin_options)?;
     let mut renderer = Renderer::new(plan);
     let mut scorer = Scorer::new(plan);

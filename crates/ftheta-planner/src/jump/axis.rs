@@ -1,5 +1,6 @@
 //! One axis as the jump programs see it: discrete motion, limits, and plants to be robust against.
 
+use super::fan::Ask;
 use super::program::{self, Ends, Goal, Request, Way};
 use super::{JumpError, polish};
 use ftheta_model::machine::Scanner;
@@ -196,6 +197,21 @@ impl Axis {
         let request = Request { n_ticks, ends: Ends::rest(), goal, way: Way::Free };
         let found = self.best(&request)?;
         Ok(found.map(|(step_rad, voltages_v)| Reach { step_rad, voltages_v }))
+    }
+
+    /// Whether a transition can be made in this many ticks, by a program for just that.
+    ///
+    /// What can be reached is convex and contains rest, so it can be made if the longest in its
+    /// direction is at least as long.
+    ///
+    /// # Errors
+    /// If the linear program cannot be solved.
+    pub fn reaches(&self, ask: &Ask, n_ticks: usize) -> Result<bool, JumpError> {
+        let start = State::new(0.0, ask.from_rad_s, 0.0, 0.0, 0.0);
+        let end = State::new(ask.distance_rad, ask.to_rad_s, 0.0, 0.0, 0.0);
+        let ends = Ends { start, end, place: true };
+        let request = Request { n_ticks, ends, goal: Goal::Farthest, way: Way::Free };
+        Ok(self.best(&request)?.is_some_and(|(factor, _)| factor >= 1.0))
     }
 
     /// The factor on the request's ends and the voltages, exact; `None` if nothing is reached.

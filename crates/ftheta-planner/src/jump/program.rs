@@ -63,6 +63,8 @@ pub(super) enum Way {
     Near(Tube),
     /// Never farther than this, rad.
     Below(f64),
+    /// Never farther than this before the end, rad.
+    Behind(f64),
 }
 
 /// From a tick on the mirror stays near the end, for good.
@@ -435,6 +437,16 @@ impl Program<'_> {
             Way::Below(limit_rad) => {
                 for tick in 1..=layout.n_ticks {
                     rows.add(at(tick, 1.0), limit_rad / units.state[0]);
+                }
+            }
+            Way::Behind(limit_rad) => {
+                let end = at(layout.n_ticks, 1.0);
+                rows.add(end.clone(), limit_rad / units.state[0]);
+                for tick in 1..layout.n_ticks {
+                    rows.add(
+                        at(tick, -1.0).into_iter().chain(end.clone()),
+                        limit_rad / units.state[0],
+                    );
                 }
             }
         }

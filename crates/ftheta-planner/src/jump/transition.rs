@@ -1,0 +1,349 @@
+//! Transitions: from any angle and speed to any other, in the fewest ticks that are known to do.
+//!
+//! Rest to rest comes from the atlas. Moving ends come from the fans, number of ticks by number of
+//! ticks, since feasible numbers have gaps. Where the angle limit stands in the way of every one of
+//! them, the axis stops, jumps and starts again. What even that cannot do, nothing can.
+
+use super::brake::{Brakes, End, Fit};
+use super::fan::{Ask, Fan, Sum, Term};
+use super::{Atlas, AtlasOptions, Axis, AxisOptions, JumpError};
+use ftheta_model::machine::Scanner;
+use ftheta_physics::galvo::{CURRENT, State};
+use std::sync::OnceLock;
+
+/// Fewest ticks with fans; fewer do not move anything.
+const N_TICKS_MIN: usize = 6;
+/// Most ticks with fans: by then every axis has had time to stop and start.
+const N_TICKS_MAX: usize = 512;
+/// Above this many ticks only every second has a fan, above twice as many every fourth.
+const N_TICKS_EACH: usize = 64;
+/// After the first number of ticks that meets the ends, this part more are tried for the angles.
+const LONGER: f64 = 0.3;
+/// A displacement may exceed the longest step of its ticks by this part, when the ends move.
+const SLACK: f64 = 1.02;
+/// Rounding that an angle, speed or current may carry.
+const ROUNDING: f64 = 1e-9;
+
+/// Where and how fast a transition starts and ends, without twist and current.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Route {
+    /// Angle at the start, rad mechanical.
+    pub from_rad: f64,
+    /// Angle at the end, rad mechanical.
+    pub to_rad: f64,
+    /// Speed at the start, rad/s.
+    pub from_rad_s: f64,
+    /// Speed at the end, rad/s.
+    pub to_rad_s: f64,
+}
+
+/// Voltages from end to end, in phases that follow on.
+#[derive(Clone, Debug)]
+pub struct Transition<'a> {
+    phases: [Phase<'a>; 3],
+}
+
+/// A stretch of voltages.
+#[derive(Clone, Debug)]
+enum Phase<'a> {
+    /// No voltage for so many ticks.
+    Rest(usize),
+    /// Sequences in shares.
+    Sum(Sum<'a>),
+    /// Solved for this transition alone.
+    Own(Vec<f64>),
+}
+
+/// Solves transitions of one axis; what it needs is solved when it is first needed.
+#[derive(Debug)]
+pub struct Transitions {
+    axis: Axis,
+    atlas: Atlas,
+    angle_max_rad: f64,
+    speed_max_rad_s: f64,
+    /// One for each number of ticks of the schedule.
+    fans: Vec<(usize, OnceLock<Result<Fan, JumpError>>)>,
+    brakes: OnceLock<Result<[Brakes; 2], JumpError>>,
+}
+
+impl Phase<'_> {
+    fn n_ticks(&self) -> usize {
+        match self {
+            Self::Rest(n_ticks) => *n_ticks,
+            Self::Sum(sum) => sum.n_ticks,
+            Self::Own(voltages_v) => voltages_v.len(),
+        }
+    }
+
+    fn voltage_v(&self, tick: usize) -> f64 {
+        match self {
+            Self::Rest(_) => 0.0,
+            Self::Sum(sum) => sum.voltage_v(tick),
+            Self::Own(voltages_v) => voltages_v[tick],
+        }
+    }
+}
+
+impl<'a> Transition<'a> {
+    fn single(sum: Sum<'a>) -> Self {
+        Self { phases: [Phase::Sum(sum), Phase::Rest(0), Phase::Rest(0)] }
+    }
+
+    /// Duration, ticks.
+    pub fn n_ticks(&self) -> usize {
+        self.phases.iter().map(Phase::n_ticks).sum()
+    }
+
+    /// Voltage of each tick, V.
+    pub fn voltages_v(&self) -> impl Iterator<Item = f64> {
+        let voltages = |phase| (0..Phase::n_ticks(phase)).map(|tick| phase.voltage_v(tick));
+        self.phases.iter().flat_map(voltages)
+    }
+}
+
+impl Transitions {
+    /// Transitions of this scanner's axes; solves the longest steps, and nothing else yet.
+    ///
+    /// # Errors
+    /// If a parameter is out of range or a program fails.
+    pub fn new(scanner: &Scanner, axis: AxisOptions) -> Result<Self, JumpError> {
+        let range_rad = 2.0 * scanner.angle_max_rad;
+        let atlas = Atlas::build(scanner, AtlasOptions { axis, range_rad })?;
+        let mut n_ticks = N_TICKS_MIN;
+        let mut fans = Vec::new();
+        while n_ticks <= N_TICKS_MAX {
+            fans.push((n_ticks, OnceLock::new()));
+            n_ticks += match n_ticks {
+                ..N_TICKS_EACH => 1,
+                N_TICKS_EACH..128 => 2,
+                _ => 4,
+            };
+        }
+        Ok(Self {
+            axis: Axis::new(scanner, axis)?,
+            atlas,
+            angle_max_rad: scanner.angle_max_rad,
+            speed_max_rad_s: scanner.speed_max_rad_s,
+            fans,
+            brakes: OnceLock::new(),
+        })
+    }
+
+    /// The voltages of a route, or `None` if no motion within the angles makes it.
+    ///
+    /// # Errors
+    /// If an end is out of range or a program fails.
+    ///
+    /// # Accuracy
+    /// Both ends within 1e-9 of the largest state; voltage, current, angle and speed within their
+    /// limits at every tick. Of 1000 routes that stop or start within 1e-3 of the room that is
+    /// theirs at least, a few are solved by a program of their own.
+    pub fn plan(&self, route: &Route) -> Result<Option<Transition<'_>>, JumpError> {
+        self.check(route)?;
+        let mut n_last = usize::MAX;
+        if let Some(rest) = self.rest(route) {
+            return Ok(Some(rest));
+        }
+        for (n_ticks, transition) in self.candidates(*route) {
+            n_last = n_last.min((n_ticks as f64 * (1.0 + LONGER)) as usize + 4);
+            if n_ticks > n_last {
+                break;
+            }
+            if self.keeps_limits(route, &transition) {
+                return Ok(Some(transition));
+            }
+        }
+        let Some(transition) = self.stop_and_start(route, 0)? else {
+            return Ok(None);
+        };
+        Ok(self.keeps_limits(route, &transition).then_some(transition))
+    }
+
+    /// The voltages of two axes that move together, in the same number of ticks; `None` if there is
+    /// no such motion within the angles.
+    ///
+    /// # Errors
+    /// As [`Self::plan`].
+    pub fn plan_both(&self, routes: &[Route; 2]) -> Result<Option<[Transition<'_>; 2]>, JumpError> {
+        routes.iter().try_for_each(|route| self.check(route))?;
+        for (n_ticks, first) in self.candidates(routes[0]) {
+            let Some(second) = self.meet(&routes[1], n_ticks) else {
+                continue;
+            };
+            if self.keeps_limits(&routes[0], &first) && self.keeps_limits(&routes[1], &second) {
+                return Ok(Some([first, second]));
+            }
+        }
+        let [first, second] = routes;
+        let Some(one) = self.stop_and_start(first, 0)? else {
+            return Ok(None);
+        };
+        let Some(other) = self.stop_and_start(second, one.n_ticks())? else {
+            return Ok(None);
+        };
+        let Some(one) = self.stop_and_start(first, other.n_ticks())? else {
+            return Ok(None);
+        };
+        let keep = self.keeps_limits(first, &one) && self.keeps_limits(second, &other);
+        Ok(keep.then_some([one, other]))
+    }
+
+    /// Numbers of ticks that meet the ends, with their voltages.
+    fn candidates(&self, route: Route) -> impl Iterator<Item = (usize, Transition<'_>)> {
+        self.fans
+            .iter()
+            .filter(move |(n_ticks, _)| self.may_meet(&route, *n_ticks))
+            .filter_map(move |&(n_ticks, _)| Some((n_ticks, self.meet(&route, n_ticks)?)))
+    }
+
+    /// Whether a number of ticks is worth solving its fan for.
+    fn may_meet(&self, route: &Route, n_ticks: usize) -> bool {
+        let ask = ask(route);
+        let duration_s = n_ticks as f64 * self.axis.tick_s;
+        let mean_rad_s = 0.5 * (ask.from_rad_s + ask.to_rad_s);
+        let displacement = (ask.distance_rad - mean_rad_s * duration_s).abs();
+        let gain_max = self.axis.galvo.torque_constant / self.axis.galvo.inertia()
+            * self.axis.current_max_a
+            * duration_s;
+        let longest = self.atlas.steps_rad().get(n_ticks).copied().unwrap_or(f64::INFINITY);
+        displacement <= SLACK * longest && (ask.to_rad_s - ask.from_rad_s).abs() <= gain_max
+    }
+
+    /// The voltages of a route in a number of ticks of the schedule, whatever its angles.
+    fn meet(&self, route: &Route, n_ticks: usize) -> Option<Transition<'_>> {
+        let index = self.fans.binary_search_by_key(&n_ticks, |(n_ticks, _)| *n_ticks).ok()?;
+        let fan = self.fans[index].1.get_or_init(|| Fan::build(&self.axis, n_ticks));
+        fan.as_ref().ok()?.meet(&ask(route)).map(Transition::single)
+    }
+
+    /// Rest to rest, from the atlas.
+    fn rest(&self, route: &Route) -> Option<Transition<'_>> {
+        if route.from_rad_s != 0.0 || route.to_rad_s != 0.0 {
+            return None;
+        }
+        let transition = Transition::single(self.jump(route.to_rad - route.from_rad)?);
+        self.keeps_limits(route, &transition).then_some(transition)
+    }
+
+    fn jump(&self, step_rad: f64) -> Option<Sum<'_>> {
+        let jump = self.atlas.jump(step_rad)?;
+        let terms = [Term::new(jump.sequence, jump.scale), Term::default()];
+        Some(Sum { n_ticks: jump.n_ticks, terms, coast_v: 0.0 })
+    }
+
+    /// Stops, jumps, and starts again, in at least so many ticks.
+    fn stop_and_start(
+        &self,
+        route: &Route,
+        n_ticks_min: usize,
+    ) -> Result<Option<Transition<'_>>, JumpError> {
+        let brakes = self.brakes.get_or_init(|| self.solve_brakes());
+        let [stops, starts] = brakes.as_ref().map_err(JumpError::clone)?;
+        let sides = [route.from_rad_s, route.to_rad_s].map(|speed| 1.0_f64.copysign(speed));
+        let stop_room_rad = self.angle_max_rad - sides[0] * route.from_rad;
+        let start_room_rad = self.angle_max_rad + sides[1] * route.to_rad;
+        let Some((stop, stopped_rad)) =
+            self.brake(stops, stop_room_rad, route.from_rad_s.abs(), sides[0])?
+        else {
+            return Ok(None);
+        };
+        let Some((start, started_rad)) =
+            self.brake(starts, start_room_rad, route.to_rad_s.abs(), sides[1])?
+        else {
+            return Ok(None);
+        };
+        let step_rad = route.to_rad - started_rad - (route.from_rad + stopped_rad);
+        let Some(mut jump) = self.jump(step_rad) else {
+            return Ok(None);
+        };
+        let n_ticks = stop.n_ticks() + jump.n_ticks + start.n_ticks();
+        // A sequence that has ended adds nothing: the axis waits.
+        jump.n_ticks += n_ticks_min.saturating_sub(n_ticks);
+        Ok(Some(Transition { phases: [stop, Phase::Sum(jump), start] }))
+    }
+
+    /// A stop or start towards one side, and how far it goes.
+    fn brake<'a>(
+        &'a self,
+        brakes: &'a Brakes,
+        room_rad: f64,
+        speed_rad_s: f64,
+        side: f64,
+    ) -> Result<Option<(Phase<'a>, f64)>, JumpError> {
+        if speed_rad_s == 0.0 {
+            return Ok(Some((Phase::Rest(0), 0.0)));
+        }
+        match brakes.fit(room_rad, speed_rad_s) {
+            Fit::Yes(mut brake) => {
+                brake.sum.terms.iter_mut().for_each(|term| term.share *= side);
+                Ok(Some((Phase::Sum(brake.sum), side * brake.distance_rad)))
+            }
+            Fit::Unknown => {
+                let n_ticks = self.ample_ticks(room_rad);
+                let solved = brakes.exact(&self.axis, room_rad, speed_rad_s, n_ticks)?;
+                Ok(solved.map(|(mut voltages_v, distance_rad)| {
+                    voltages_v.iter_mut().for_each(|voltage| *voltage *= side);
+                    (Phase::Own(voltages_v), side * distance_rad)
+                }))
+            }
+            Fit::No => Ok(None),
+        }
+    }
+
+    fn solve_brakes(&self) -> Result<[Brakes; 2], JumpError> {
+        let build = |end| {
+            let ticks = |room_rad| self.ample_ticks(room_rad);
+            Brakes::build(&self.axis, end, self.speed_max_rad_s, ticks)
+        };
+        Ok([build(End::Stop)?, build(End::Start)?])
+    }
+
+    /// Ticks in which an axis can go through a room twice and stop.
+    fn ample_ticks(&self, room_rad: f64) -> usize {
+        let steps_rad = self.atlas.steps_rad();
+        let n_ticks = steps_rad.partition_point(|&step| step < 2.0 * room_rad);
+        n_ticks.min(steps_rad.len()) + 16
+    }
+
+    fn check(&self, route: &Route) -> Result<(), JumpError> {
+        let angle = 2.0 * self.angle_max_rad;
+        let rows = [
+            ("start angle rad", route.from_rad, angle),
+            ("end angle rad", route.to_rad, angle),
+            ("start speed rad/s", route.from_rad_s, self.speed_max_rad_s),
+            ("end speed rad/s", route.to_rad_s, self.speed_max_rad_s),
+        ];
+        for (quantity, value, high) in rows {
+            if !(-high..=high).contains(&value) {
+                return Err(JumpError::Parameter { quantity, value, low: -high, high });
+            }
+        }
+        Ok(())
+    }
+
+    /// Plays the voltages on the nominal axis.
+    fn keeps_limits(&self, route: &Route, transition: &Transition<'_>) -> bool {
+        let (angle_row, speed_row) =
+            (self.axis.galvo.mirror_row(), self.axis.galvo.mirror_speed_row());
+        let inside = 1.0 + ROUNDING;
+        let mut state = State::new(route.from_rad, route.from_rad_s, 0.0, 0.0, 0.0);
+        let mut within = state[0].abs().max(route.to_rad.abs()) <= self.angle_max_rad * inside;
+        for phase in &transition.phases {
+            for tick in 0..phase.n_ticks() {
+                state = self.axis.advance(&state, phase.voltage_v(tick));
+                within &= angle_row.dot(&state).abs() <= self.angle_max_rad * inside
+                    && speed_row.dot(&state).abs() <= self.speed_max_rad_s * inside
+                    && state[CURRENT].abs() <= self.axis.current_max_a * inside;
+            }
+        }
+        within
+    }
+}
+
+fn ask(route: &Route) -> Ask {
+    Ask {
+        distance_rad: route.to_rad - route.from_rad,
+        from_rad_s: route.from_rad_s,
+        to_rad_s: route.to_rad_s,
+    }
+}
