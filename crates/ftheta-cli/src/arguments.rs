@@ -194,6 +194,19 @@ pub enum MachineAction {
         /// Preset or machine file.
         machine: String,
     },
+    /// Find the modes of a mechanism by finite elements, and how far each turns the mirror.
+    #[command(after_help = "\
+Example: ftheta machine mechanism gallery/s10-mechanism.toml --machine S10 --out mine.toml")]
+    Mechanism {
+        /// Mechanism file: rotor, shaft, mount, mirror, bearings.
+        file: PathBuf,
+        /// Preset or machine file that gives what the mechanism does not say.
+        #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+        machine: String,
+        /// Machine file to write, with the mechanism's inertias and torsional mode.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
 }
 
 #[derive(Clone, Copy, ValueEnum)]

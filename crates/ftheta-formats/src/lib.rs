@@ -1,6 +1,7 @@
 //! File syntax of ftheta: SVG drawings, machine and recipe files, plan files.
 
 pub mod machine;
+pub mod mechanism;
 pub mod plan_file;
 pub mod recipe;
 pub mod svg;

@@ -8,6 +8,7 @@ pub mod galvo;
 pub mod laser;
 pub mod lossy;
 pub mod map_table;
+pub mod mechanism;
 pub mod modal;
 pub mod optics;
 pub mod plan;

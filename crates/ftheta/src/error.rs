@@ -4,6 +4,7 @@ use ftheta_formats::plan_file::PlanFileError;
 use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
+use ftheta_physics::mechanism::MechanismError;
 use ftheta_physics::servo::ServoError;
 use ftheta_planner::PlanError;
 use ftheta_planner::jump::JumpError;
@@ -94,6 +95,9 @@ pub enum Error {
     /// The plan is refused.
     #[error(transparent)]
     Audit(#[from] AuditError),
+    /// A mechanism cannot be computed.
+    #[error(transparent)]
+    Mechanism(#[from] MechanismError),
     /// The machine's servo cannot be built.
     #[error(transparent)]
     Servo(#[from] ServoError),
@@ -150,6 +154,7 @@ impl Error {
             }
             Self::Jump(error) => ("jump".into(), error.to_string(), String::new()),
             Self::Audit(error) => error.fault(),
+            Self::Mechanism(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),
         };
