@@ -83,7 +83,7 @@ impl LossyAxis {
             + part.step.b * (voltage_v + missing * speed)
             + part.per_torque * smooth;
         // The torque that would stop the rotor by the end of the step, as far as friction can.
-        let coulomb = self.torque.losses.friction_coulomb_n_m;
+        let coulomb = self.torque.losses.friction_coulomb_n_m.max(0.0);
         let stopping = -self.torque.rotor_speed_row.dot(&free) / part.speed_per_torque;
         free + part.per_torque * stopping.clamp(-coulomb, coulomb)
     }

@@ -182,7 +182,7 @@ fn offset(offset_m: f64, damping_ratio: f64) -> Mechanism {
 fn spin(mechanism: &Mechanism, n_modes: usize) -> (Spin, ftheta_physics::mechanism::Modes) {
     let model = Model::new(mechanism).unwrap();
     let modes = model.modes(n_modes).unwrap();
-    (Spin::new(&model, &modes), modes)
+    (Spin::new(&modes), modes)
 }
 
 /// A small torque moves the mirror as independent modes would, in closed form.
@@ -257,12 +257,12 @@ fn fast_rotation_deflects_as_jeffcott_says() {
     let law: Vec<f64> = times.iter().map(|&t| angle(t)).collect();
     let motion = spin.play(&times, Driven::Angle(&law)).unwrap();
     let tilt = |softened: bool| -> f64 {
-        let modes = modes.shapes.iter().enumerate().map(|(i, shape)| {
+        let each = modes.shapes.iter().enumerate().map(|(i, shape)| {
             let square = (TAU * shape.frequency_hz).powi(2);
             let soft = if softened { speed * speed } else { 0.0 };
-            shape.tilt * speed * speed * spin.pull[i] / (square - soft)
+            shape.tilt * speed * speed * modes.rotation.pull[i] / (square - soft)
         });
-        modes.sum()
+        each.sum()
     };
     // The spline's own end brings the speed to zero, so look a little before it.
     let found = motion[780].tilt_rad;
@@ -277,16 +277,19 @@ fn fast_rotation_deflects_as_jeffcott_says() {
 fn rotation_costs_nothing_and_bending_softens() {
     let model = Model::new(&torsion_bar()).unwrap();
     let modes = model.modes(12).unwrap();
-    let spin = Spin::new(&model, &modes);
     for (index, shape) in modes.shapes.iter().enumerate() {
-        let stiffening = spin.stiffening[(index, index)];
+        let stiffening = modes.rotation.stiffening[(index, index)];
         match shape.kind {
             ModeKind::Torsion => assert!(stiffening.abs() < 1e-6, "{stiffening}"),
             ModeKind::Axial => assert!(stiffening.abs() < 0.01, "{stiffening}"),
             _ => assert!(stiffening > -1.0 && stiffening < -0.5, "{stiffening}"),
         }
     }
-    assert!((spin.coupling[(0, 1)].abs() - 1.0).abs() < 0.1, "{}", spin.coupling[(0, 1)]);
+    assert!(
+        (modes.rotation.coupling[(0, 1)].abs() - 1.0).abs() < 0.1,
+        "{}",
+        modes.rotation.coupling[(0, 1)]
+    );
 }
 
 /// A driven rotor follows its law, and the mirror lags by acceleration over its own frequency.

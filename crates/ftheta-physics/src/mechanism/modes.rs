@@ -2,6 +2,7 @@
 
 use super::MechanismError;
 use super::assembly::{Direction, Model};
+use super::rotation::Rotation;
 use super::solve::BandFactor;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::TAU;
@@ -58,6 +59,8 @@ pub struct Modes {
     pub damping_ratio: f64,
     /// The modes, slowest first.
     pub shapes: Vec<ModeShape>,
+    /// What rotation does to them.
+    pub rotation: Rotation,
 }
 
 /// Shift of the stiffness by so much mass, that the free rotation does not make it singular.
@@ -182,7 +185,12 @@ impl Model {
                 shape,
             });
         }
-        Ok(Modes { inertia_kg_m2: self.inertia_kg_m2(), damping_ratio: self.damping_ratio, shapes })
+        Ok(Modes {
+            inertia_kg_m2: self.inertia_kg_m2(),
+            damping_ratio: self.damping_ratio,
+            rotation: Rotation::new(&self.points, &shapes),
+            shapes,
+        })
     }
 
     /// Which motion has the greatest share of the kinetic energy.

@@ -10,8 +10,10 @@
 //!
 //! Source: floating frame of reference with mean-axis conditions (Canavin and Likins 1977).
 
-use super::{MechanismError, Model, Modes};
-use nalgebra::{DMatrix, DVector};
+use super::rotation::Rotation;
+use super::samples::{check_samples, spline_accelerations};
+use super::{MechanismError, Modes};
+use nalgebra::DVector;
 use std::f64::consts::TAU;
 
 /// A mechanism's equations of motion in its modes.
@@ -24,12 +26,7 @@ pub struct Spin {
     inertia: f64,
     squares: DVector<f64>,
     damping: DVector<f64>,
-    /// `G`: how much mode i moves across mode j.
-    pub coupling: DMatrix<f64>,
-    /// `S`: stiffness per squared speed.
-    pub stiffening: DMatrix<f64>,
-    /// `r`: generalised force per squared speed.
-    pub pull: DVector<f64>,
+    rotation: Rotation,
     rotor: DVector<f64>,
     mirror: DVector<f64>,
     tilt: DVector<f64>,
@@ -86,41 +83,21 @@ const STEPS_MAX: f64 = 2e7;
 const STEP_RADIANS: f64 = 0.1;
 
 impl Spin {
-    /// Equations of motion of a model in these modes of it.
-    pub fn new(model: &Model, modes: &Modes) -> Self {
+    /// Equations of motion in these modes.
+    pub fn new(modes: &Modes) -> Self {
         let n = modes.shapes.len();
         let each = |value: &dyn Fn(usize) -> f64| DVector::from_fn(n, |i, _| value(i));
         let omega = each(&|i| TAU * modes.shapes[i].frequency_hz);
-        let mut spin = Self {
+        Self {
             inertia: modes.inertia_kg_m2,
             squares: omega.component_mul(&omega),
             damping: &omega * (2.0 * modes.damping_ratio),
-            coupling: DMatrix::zeros(n, n),
-            stiffening: DMatrix::zeros(n, n),
-            pull: DVector::zeros(n),
+            rotation: modes.rotation.clone(),
             rotor: each(&|i| modes.shapes[i].rotor),
             mirror: each(&|i| modes.shapes[i].mirror),
             tilt: each(&|i| modes.shapes[i].tilt),
             step_s: STEP_RADIANS / omega.max(),
-        };
-        let sum = |row: &[(usize, f64)], mode: usize| -> f64 {
-            row.iter().map(|&(index, weight)| weight * modes.shapes[mode].shape[index]).sum()
-        };
-        for point in &model.points {
-            let x: Vec<f64> = (0..n).map(|i| sum(&point.displacement[0], i)).collect();
-            let y: Vec<f64> = (0..n).map(|i| sum(&point.displacement[1], i)).collect();
-            let slope: Vec<f64> = (0..n).map(|i| sum(&point.slope, i)).collect();
-            for i in 0..n {
-                let across = point.place_m[0] * x[i] + point.place_m[1] * y[i];
-                spin.pull[i] += point.mass_kg * across;
-                for j in 0..n {
-                    spin.coupling[(i, j)] += point.mass_kg * (x[i] * y[j] - y[i] * x[j]);
-                    spin.stiffening[(i, j)] += point.tension_kg_m2 * slope[i] * slope[j]
-                        - point.mass_kg * (x[i] * x[j] + y[i] * y[j]);
-                }
-            }
         }
-        spin
     }
 
     /// A mechanism at rest at an angle.
@@ -139,7 +116,7 @@ impl Spin {
         let (twist, speed) = (&state.twist, &state.twist_speed);
         let omega = state.speed_rad_s;
         0.5 * speed.norm_squared()
-            + omega * twist.dot(&(&self.coupling * speed))
+            + omega * twist.dot(&(&self.rotation.coupling * speed))
             + 0.5 * omega * omega * self.inertia_at(twist)
             + 0.5 * twist.component_mul(twist).dot(&self.squares)
     }
@@ -147,11 +124,12 @@ impl Spin {
     /// Angular momentum about the shaft, N·m·s.
     pub fn momentum_n_m_s(&self, state: &SpinState) -> f64 {
         state.speed_rad_s * self.inertia_at(&state.twist)
-            + state.twist.dot(&(&self.coupling * &state.twist_speed))
+            + state.twist.dot(&(&self.rotation.coupling * &state.twist_speed))
     }
 
     fn inertia_at(&self, twist: &DVector<f64>) -> f64 {
-        self.inertia + 2.0 * self.pull.dot(twist) - twist.dot(&(&self.stiffening * twist))
+        self.inertia + 2.0 * self.rotation.pull.dot(twist)
+            - twist.dot(&(&self.rotation.stiffening * twist))
     }
 
     /// Moves a state on by a time under a constant torque, N·m.
@@ -233,17 +211,17 @@ impl Spin {
     /// Accelerations of frame and modes, and the torque.
     fn accelerations(&self, state: &SpinState, input: Input) -> (f64, DVector<f64>, f64) {
         let (omega, twist, speed) = (state.speed_rad_s, &state.twist, &state.twist_speed);
-        let across = &self.coupling * twist;
-        let stiffened = &self.stiffening * twist;
-        let forces = &self.coupling * speed * (2.0 * omega)
+        let across = &self.rotation.coupling * twist;
+        let stiffened = &self.rotation.stiffening * twist;
+        let forces = &self.rotation.coupling * speed * (2.0 * omega)
             - twist.component_mul(&self.squares)
             - speed.component_mul(&self.damping)
-            + (&self.pull - &stiffened) * (omega * omega);
+            + (&self.rotation.pull - &stiffened) * (omega * omega);
         // The modes' accelerations are forces + Ω'·across + torque·rotor; twistᵀG is -acrossᵀ.
         let inertia = self.inertia_at(twist) - across.norm_squared();
         let lever = 1.0 + across.dot(&self.rotor);
-        let lost =
-            2.0 * omega * (self.pull.dot(speed) - stiffened.dot(speed)) - across.dot(&forces);
+        let lost = 2.0 * omega * (self.rotation.pull.dot(speed) - stiffened.dot(speed))
+            - across.dot(&forces);
         let torque = match input {
             Input::Torque(torque) => torque,
             // The rotor's acceleration Ω' + rotorᵀη'' is given.
@@ -284,50 +262,4 @@ impl SpinState {
             twist_speed: &self.twist_speed + &slope.twist_speed * h,
         }
     }
-}
-
-fn check_samples(times_s: &[f64], values: &[f64]) -> Result<(), MechanismError> {
-    let fault = |index, what| Err(MechanismError::Samples { index, what });
-    if times_s.len() != values.len() || times_s.len() < 2 {
-        return fault(values.len(), "there must be a time for each, and two of them");
-    }
-    for (index, (time_s, value)) in times_s.iter().zip(values).enumerate() {
-        if !(time_s.is_finite() && value.is_finite()) {
-            return fault(index, "not a finite number");
-        }
-        if index > 0 && *time_s <= times_s[index - 1] {
-            return fault(index, "not later than the one before");
-        }
-    }
-    Ok(())
-}
-
-/// Second derivatives at the knots of the cubic spline that starts and ends without slope.
-fn spline_accelerations(times_s: &[f64], angles_rad: &[f64]) -> Vec<f64> {
-    let n = times_s.len();
-    let slope = |i: usize| (angles_rad[i + 1] - angles_rad[i]) / (times_s[i + 1] - times_s[i]);
-    // Row i: left·a[i-1] + 2(left + right)·a[i] + right·a[i+1] = 6·(change of slope).
-    let width = |i: usize| times_s[i + 1] - times_s[i];
-    let row = |i: usize| {
-        let left = if i > 0 { width(i - 1) } else { 0.0 };
-        let right = if i + 1 < n { width(i) } else { 0.0 };
-        let slope_before = if i > 0 { slope(i - 1) } else { 0.0 };
-        let slope_after = if i + 1 < n { slope(i) } else { 0.0 };
-        (left, 2.0 * (left + right), right, 6.0 * (slope_after - slope_before))
-    };
-    // Elimination downwards, then back up.
-    let mut reduced: Vec<(f64, f64)> = Vec::with_capacity(n);
-    for i in 0..n {
-        let (left, middle, right, known) = row(i);
-        let (ratio, value) = reduced.last().copied().unwrap_or((0.0, 0.0));
-        let pivot = middle - left * ratio;
-        reduced.push((right / pivot, (known - left * value) / pivot));
-    }
-    let mut accelerations = vec![0.0; n];
-    let mut after = 0.0;
-    for i in (0..n).rev() {
-        after = reduced[i].1 - reduced[i].0 * after;
-        accelerations[i] = after;
-    }
-    accelerations
 }
