@@ -1,5 +1,6 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use ftheta_formats::motion_law::MotionLawError;
 use ftheta_formats::plan_file::PlanFileError;
 use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::toml_table::TomlError;
@@ -95,6 +96,9 @@ pub enum Error {
     /// The plan is refused.
     #[error(transparent)]
     Audit(#[from] AuditError),
+    /// A motion law is at fault.
+    #[error(transparent)]
+    MotionLaw(#[from] MotionLawError),
     /// A mechanism cannot be computed.
     #[error(transparent)]
     Mechanism(#[from] MechanismError),
@@ -154,6 +158,7 @@ impl Error {
             }
             Self::Jump(error) => ("jump".into(), error.to_string(), String::new()),
             Self::Audit(error) => error.fault(),
+            Self::MotionLaw(error) => error.fault(),
             Self::Mechanism(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),

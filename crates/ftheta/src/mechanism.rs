@@ -3,8 +3,11 @@
 use crate::output::write_file;
 use crate::{Error, import, machines};
 use ftheta_formats::machine::{read, to_toml};
-use ftheta_formats::mechanism;
+use ftheta_formats::motion_law::MotionLaw;
+use ftheta_formats::{mechanism, motion_law};
+use ftheta_physics::mechanism::spin::{Driven, MotionSample, Spin};
 use ftheta_physics::mechanism::{MechanismError, Model, Modes, TwoInertias};
+use std::fmt::Write;
 use std::path::Path;
 
 /// Modes that are computed.
@@ -52,4 +55,50 @@ pub fn write_machine(machine: &str, analysis: &Analysis, path: &Path) -> Result<
     // What is written must be readable.
     read(&path.display().to_string(), &text)?;
     write_file(path, text.as_bytes())
+}
+
+/// What a mirror does while the rotor follows a law.
+#[derive(Clone, Debug)]
+pub struct Response {
+    /// The law.
+    pub law: MotionLaw,
+    /// One sample for each of the law's.
+    pub motion: Vec<MotionSample>,
+}
+
+/// Drives the rotor of a mechanism along a law in a file (`time_us,angle_deg`).
+///
+/// # Errors
+/// If the law cannot be read or is at fault, or is too long for the mechanism's modes.
+pub fn respond(analysis: &Analysis, law: &Path) -> Result<Response, Error> {
+    let law = motion_law::read(&law.display().to_string(), &import::text(law)?)?;
+    let motion = Spin::new(&analysis.modes).play(&law.times_s, Driven::Angle(&law.angles_rad))?;
+    Ok(Response { law, motion })
+}
+
+impl Response {
+    /// Angle of the mirror less that of the law at every sample, rad.
+    pub fn errors_rad(&self) -> impl Iterator<Item = f64> {
+        self.motion.iter().zip(&self.law.angles_rad).map(|(found, law)| found.mirror_rad - law)
+    }
+
+    /// Greatest torque that the law takes, N·m.
+    pub fn torque_max_n_m(&self) -> f64 {
+        self.motion.iter().fold(0.0, |peak, sample| peak.max(sample.torque_n_m.abs()))
+    }
+
+    /// Writes the response as text, a line per sample.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let mut text = String::from("time_us,rotor_deg,mirror_deg,tilt_deg,torque_mn_m\n");
+        for (time_s, sample) in self.law.times_s.iter().zip(&self.motion) {
+            let [rotor, mirror, tilt] =
+                [sample.rotor_rad, sample.mirror_rad, sample.tilt_rad].map(f64::to_degrees);
+            let torque = sample.torque_n_m * 1e3;
+            let _ = writeln!(text, "{},{rotor},{mirror},{tilt},{torque}", time_s * 1e6);
+        }
+        write_file(path, text.as_bytes())
+    }
 }

@@ -1,33 +1,59 @@
 //! `ftheta machine mechanism`: modes of a mechanism file.
 
+use crate::arguments::Mechanism;
 use crate::json;
 use crate::screen::say;
 use ftheta::Error;
-use ftheta::mechanism::{Analysis, analyse, write_machine};
+use ftheta::mechanism::{Analysis, Response, analyse, respond, write_machine};
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// 1 g·cm² in kg·m².
 const G_CM2: f64 = 1e-7;
 
-/// Analyses a mechanism, prints what it found, and writes a machine file if asked to.
-pub fn run(file: &Path, machine: &str, out: Option<&Path>, as_json: bool) -> Result<(), Error> {
-    let analysis = analyse(file)?;
-    if let Some(path) = out {
-        write_machine(machine, &analysis, path)?;
+/// Analyses a mechanism, prints what it found, and writes the files that are asked for.
+pub fn run(arguments: &Mechanism, as_json: bool) -> Result<(), Error> {
+    let analysis = analyse(&arguments.file)?;
+    let response = arguments.law.as_ref().map(|law| respond(&analysis, law)).transpose()?;
+    if let Some(path) = &arguments.out {
+        write_machine(&arguments.machine, &analysis, path)?;
+    }
+    if let (Some(response), Some(path)) = (&response, &arguments.response) {
+        response.write(path)?;
     }
     if as_json {
         let mut object = summary(&analysis);
-        object["files"] =
-            out.map_or(json!({}), |path| json!({"machine": path.display().to_string()}));
-        json::print(&object);
-    } else {
-        print(&analysis);
-        if let Some(path) = out {
-            say!("machine file: {}", path.display());
+        object["files"] = [("machine", &arguments.out), ("response", &arguments.response)]
+            .into_iter()
+            .filter_map(|(key, path)| Some((key, path.as_ref()?.display().to_string())))
+            .collect();
+        if let Some(response) = &response {
+            object["response"] = measures(response)
+                .into_iter()
+                .map(|(key, value)| (key.to_owned(), Value::from(value)))
+                .collect();
         }
+        json::print(&object);
+        return Ok(());
+    }
+    print(&analysis);
+    for (key, value) in response.iter().flat_map(measures) {
+        say!("  {key:24} {value:.3}");
+    }
+    for path in [&arguments.out, &arguments.response].into_iter().flatten() {
+        say!("written: {}", path.display());
     }
     Ok(())
+}
+
+/// What a response comes to.
+fn measures(response: &Response) -> [(&'static str, f64); 3] {
+    let greatest = response.errors_rad().fold(0.0_f64, |peak, error| peak.max(error.abs()));
+    let last = response.errors_rad().last().unwrap_or(0.0);
+    [
+        ("mirror_error_max_urad", greatest * 1e6),
+        ("mirror_error_end_urad", last * 1e6),
+        ("torque_max_mn_m", response.torque_max_n_m() * 1e3),
+    ]
 }
 
 fn summary(analysis: &Analysis) -> Value {

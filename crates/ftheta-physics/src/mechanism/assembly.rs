@@ -112,9 +112,11 @@ impl Model {
         self.n_freedoms
     }
 
-    /// Full stiffness and mass matrices, SI, for checks on small models.
-    pub fn matrices(&self) -> [DMatrix<f64>; 2] {
-        [&self.stiffness, &self.mass].map(|entries| entries.to_dense(self.n_freedoms))
+    /// Full stiffness and mass matrices, SI, for checks on small models; `None` above 3000
+    /// freedoms, where they would fill the memory.
+    pub fn matrices(&self) -> Option<[DMatrix<f64>; 2]> {
+        let entries = [&self.stiffness, &self.mass];
+        (self.n_freedoms <= 3000).then(|| entries.map(|matrix| matrix.to_dense(self.n_freedoms)))
     }
 
     /// Weights of the freedoms in the angles of rotor and mirror about the shaft.
