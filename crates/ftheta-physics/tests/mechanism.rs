@@ -6,6 +6,7 @@ use ftheta_physics::mechanism::{
     Bearing, Coil, Material, Mechanism, MechanismError, Mirror, ModeKind, Model, Part, Segment,
     Station,
 };
+use proptest::prelude::*;
 use std::f64::consts::TAU;
 
 const STEEL: Material = Material { young_pa: 200e9, poisson: 0.3, density_kg_m3: 7850.0 };
@@ -365,4 +366,51 @@ fn faulty_samples_are_refused() {
     assert_eq!(message(&[0.0, 1.0], &[1.0, f64::NAN]), "sample 1: not a finite number");
     assert!(message(&[0.0, 1e9], &[0.0, 0.0]).contains("2e7 steps"));
     assert!(matches!(spin.advance(&spin.rest(0.0), 0.0, 1e9), Err(MechanismError::Samples { .. })));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    /// Whatever a mechanism file can state gives modes or an error, and modes are in order.
+    #[test]
+    fn any_mechanism_gives_modes_or_an_error(
+        segments in prop::collection::vec(
+            (-5.0..0.0_f64, -5.0..-0.3_f64, 0.0..1.2_f64, 5.0..12.3_f64),
+            1..4
+        ),
+        bearings in prop::collection::vec((0.0..1.0_f64, -1.0..10.0_f64, -1.0..10.0_f64), 0..3),
+        plate in (-4.0..-0.3_f64, -4.0..-0.3_f64, -5.0..-1.0_f64, 0.01..1.0_f64, -0.1..0.1_f64),
+    ) {
+        let mut any = mechanism(1e-3);
+        any.segments = segments
+            .iter()
+            .map(|&(length, diameter, bore, young)| Segment {
+                part: Part::Rotor,
+                length_m: 10_f64.powf(length),
+                diameter_m: 10_f64.powf(diameter),
+                bore_m: bore * 10_f64.powf(diameter),
+                material: Material { young_pa: 10_f64.powf(young), ..STEEL },
+            })
+            .collect();
+        let shaft_m = any.shaft_m();
+        any.bearings = bearings
+            .iter()
+            .map(|&(place, radial, axial)| Bearing {
+                position_m: place * shaft_m,
+                radial_n_m: 10_f64.powf(radial),
+                axial_n_m: 10_f64.powf(axial),
+            })
+            .collect();
+        let (width, height, thickness, bond, offset_m) = plate;
+        any.mirror.stations =
+            ftheta_physics::mechanism::rectangle(10_f64.powf(width), 10_f64.powf(height));
+        any.mirror.thickness_m = 10_f64.powf(thickness);
+        any.mirror.bond_m = bond * 10_f64.powf(height);
+        any.mirror.offset_m = offset_m;
+        any.element_m = 0.5 * shaft_m.max(any.mirror.height_m()).max(any.mirror.width_m());
+        if let Ok(modes) = Model::new(&any).and_then(|model| model.modes(6)) {
+            prop_assert!(modes.shapes.iter().all(|shape| shape.frequency_hz.is_finite()));
+            prop_assert!(modes.shapes.is_sorted_by_key(|shape| shape.frequency_hz));
+            let _ = Spin::new(&modes).play(&[0.0, 1e-6], Driven::Torque(&[0.0, 1e-6]));
+        }
+    }
 }

@@ -32,8 +32,8 @@ impl ModeKind {
     }
 }
 
-/// One elastic mode. Its displacements are scaled to a modal inertia of 1 kg·m² where 1 rad of a
-/// freedom counts as 1, 1 m of a displacement too.
+/// One elastic mode: what moves how far per unit of its coordinate, whose scale is such that the
+/// mode's inertia is 1 kg·m².
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeShape {
     /// Frequency, Hz.
@@ -46,7 +46,7 @@ pub struct ModeShape {
     pub mirror: f64,
     /// Angle of the mirror about x, rad per unit.
     pub tilt: f64,
-    /// Displacements.
+    /// Displacements in m and rotations in rad of all freedoms, per unit.
     pub shape: DVector<f64>,
 }
 
