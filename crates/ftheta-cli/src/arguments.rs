@@ -201,6 +201,30 @@ pub enum MachineAction {
         /// Preset or machine file.
         machine: String,
     },
+    /// Find the modes of a mechanism by finite elements, and how far each turns the mirror.
+    Mechanism(Mechanism),
+}
+
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  ftheta machine mechanism gallery/s10-mechanism.toml --machine S10 --out mine.toml
+  ftheta machine mechanism gallery/s10-mechanism.toml --law law.csv --response mirror.csv")]
+pub struct Mechanism {
+    /// Mechanism file: rotor, shaft, mount, mirror, bearings.
+    pub file: PathBuf,
+    /// Preset or machine file that gives what the mechanism does not say.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Machine file to write, with the mechanism's inertias and torsional mode.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Motion law that the rotor follows: lines of time_us,angle_deg after a line that says so.
+    #[arg(long, value_name = "FILE")]
+    pub law: Option<PathBuf>,
+    /// File for what the mirror does meanwhile.
+    #[arg(long, value_name = "FILE", requires = "law")]
+    pub response: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -4,6 +4,7 @@ pub mod convert;
 pub mod jump;
 pub mod machine;
 pub mod mark;
+pub mod mechanism;
 pub mod verify;
 
 use crate::arguments::Arguments;

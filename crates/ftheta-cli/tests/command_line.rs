@@ -276,3 +276,33 @@ fn machines_are_listed_shown_and_checked() {
     let completions = bench.run(&["completions", "bash"]);
     assert!(String::from_utf8(completions.stdout).unwrap().contains("--mismatch"));
 }
+
+#[test]
+fn mechanisms_become_machines() {
+    let bench = Bench::new();
+    let text = include_str!("../../../gallery/s10-mechanism.toml");
+    let file = bench.write("parts.toml", text);
+    let (code, found) = bench.json(&["machine", "mechanism", &file, "--out", "mine.toml"]);
+    assert_eq!(code, 0, "{found}");
+    let frequency_hz = number(&found, &["two_inertias", "torsional_mode_hz"]);
+    assert!((frequency_hz / 5200.0 - 1.0).abs() < 0.01, "{found}");
+    let torsion = found["modes"].as_array().unwrap().iter().find(|mode| mode["kind"] == "torsion");
+    assert!(number(torsion.unwrap(), &["drive"]) < -0.9, "{found}");
+    let (code, checked) = bench.json(&["machine", "check", "mine.toml"]);
+    assert_eq!((code, checked["name"].as_str()), (0, Some("mine")), "{checked}");
+    let law = "time_us,angle_deg\n0,0\n100,0.1\n200,0.4\n300,0.7\n400,0.8\n500,0.8\n";
+    bench.write("law.csv", law);
+    let arguments = ["machine", "mechanism", &file, "--law", "law.csv", "--response", "out.csv"];
+    let (code, found) = bench.json(&arguments);
+    assert_eq!(code, 0, "{found}");
+    let lag_urad = number(&found, &["response", "mirror_error_max_urad"]);
+    assert!(lag_urad > 100.0 && lag_urad < 10_000.0, "{found}");
+    let response = fs::read_to_string(bench.path("out.csv")).unwrap();
+    assert_eq!(response.lines().count(), law.lines().count(), "{response}");
+    bench.write("law.csv", law.replace("300", "100"));
+    let fault = bench.fault(&arguments);
+    assert_eq!((&fault["where"], &fault["value"]), (&"law.csv:5".into(), &"\"100,0.7\"".into()));
+    bench.write("bad.toml", text.replace("length_mm = 4\n", "length_mm = 0\n"));
+    let fault = bench.fault(&["machine", "mechanism", "bad.toml"]);
+    assert_eq!((&fault["value"], &fault["limit"]), (&"0".into(), &"0.01 to 1000".into()));
+}

@@ -2,6 +2,8 @@
 
 pub mod atlas_file;
 pub mod machine;
+pub mod mechanism;
+pub mod motion_law;
 pub mod plan_file;
 pub mod recipe;
 pub mod svg;

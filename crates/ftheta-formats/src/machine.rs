@@ -5,7 +5,7 @@ mod write;
 
 use crate::toml_table::{Section, TomlError, parse};
 use ftheta_model::machine::{
-    Axis, Drive, Laser, Lens, Machine, Optics, Output, Scanner, Sensor, Servo,
+    Axis, Drive, Laser, Lens, Losses, Machine, Optics, Output, Scanner, Sensor, Servo,
 };
 use ftheta_physics::laser::spot_diameter_mm;
 pub use preset::{PRESETS, preset, preset_text};
@@ -23,13 +23,15 @@ const G_CM2: f64 = 1e-7;
 pub fn read(file: &str, text: &str) -> Result<Machine, TomlError> {
     parse(file, text, |root| {
         let name = root.text("name")?.unwrap_or(file).to_owned();
-        let scanner = root.section("scanner", scanner)?.ok_or_else(|| root.missing("scanner"))?;
+        let output = root.section("output", output)?.unwrap_or(DEFAULT_OUTPUT);
+        let scanner = root
+            .section("scanner", |section| scanner(section, &output))?
+            .ok_or_else(|| root.missing("scanner"))?;
         let optics = root.section("optics", optics)?.ok_or_else(|| root.missing("optics"))?;
         let laser = root
             .section("laser", |section| laser(section, &optics))?
             .ok_or_else(|| root.missing("laser"))?;
-        let output = root.section("output", output)?;
-        Ok(Machine { name, scanner, optics, laser, output: output.unwrap_or(DEFAULT_OUTPUT) })
+        Ok(Machine { name, scanner, optics, laser, output })
     })
 }
 
@@ -40,10 +42,11 @@ const DEFAULT_OUTPUT: Output = Output {
     drive: Drive::ServoKnown,
 };
 
-fn scanner(section: &Section<'_>) -> Result<Scanner, TomlError> {
+fn scanner(section: &Section<'_>, output: &Output) -> Result<Scanner, TomlError> {
     let servo = section.section("servo", servo)?.ok_or_else(|| section.missing("servo"))?;
     let sensor = section.section("sensor", sensor)?.unwrap_or_default();
-    Ok(Scanner {
+    let losses = losses(section)?;
+    let scanner = Scanner {
         rotor_inertia_kg_m2: section.need("rotor_inertia_g_cm2", 1e-5..=1e4)? * G_CM2,
         mirror_inertia_kg_m2: section.need("mirror_inertia_g_cm2", 1e-5..=1e4)? * G_CM2,
         torque_constant_n_m_a: section.need("torque_constant_mn_m_a", 0.01..=1e4)? * 1e-3,
@@ -59,8 +62,33 @@ fn scanner(section: &Section<'_>) -> Result<Scanner, TomlError> {
         speed_max_rad_s: section.number("speed_max_rad_s", 0.1..=1e5)?.unwrap_or(1000.0),
         f1_uncertainty: section.number("f1_uncertainty", 0.0..=0.5)?.unwrap_or(0.03),
         kt_uncertainty: section.number("kt_uncertainty", 0.0..=0.5)?.unwrap_or(0.005),
+        losses,
         servo,
         sensor,
+    };
+    let nyquist_hz = output.nyquist_hz();
+    if scanner.torsional_mode_hz >= nyquist_hz {
+        let limit = format!(
+            "what a period of {} µs can steer, below {nyquist_hz} Hz",
+            output.period_s() * 1e6
+        );
+        return Err(section.refuse("torsional_mode_hz", limit));
+    }
+    let torque_mn_m =
+        scanner.torque_constant_n_m_a * (1.0 - losses.torque_falloff) * scanner.current_max_a * 1e3;
+    if losses.friction_coulomb_n_m * 1e3 >= torque_mn_m {
+        let limit = format!("what the peak torque overcomes, below {torque_mn_m:.3} mN·m");
+        return Err(section.refuse("friction_coulomb_mn_m", limit));
+    }
+    Ok(scanner)
+}
+
+fn losses(section: &Section<'_>) -> Result<Losses, TomlError> {
+    let or_none = |key, range| Ok(section.number(key, range)?.unwrap_or(0.0));
+    Ok(Losses {
+        torque_falloff: or_none("torque_falloff", 0.0..=0.5)?,
+        friction_coulomb_n_m: or_none("friction_coulomb_mn_m", 0.0..=1e4)? * 1e-3,
+        friction_viscous_n_m_s_rad: or_none("friction_viscous_un_m_s_rad", 0.0..=1e4)? * 1e-6,
     })
 }
 

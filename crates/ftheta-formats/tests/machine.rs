@@ -122,3 +122,35 @@ fn recipe_reads_pens_and_delays() {
     let error = recipe::read("r.toml", "[[pen]]\nspeed = 3").unwrap_err().to_string();
     assert_eq!(error, "r.toml:2: unknown key pen.speed, did you mean mark_speed_mm_s?");
 }
+
+#[test]
+fn losses_read_and_survive_a_round_trip() {
+    let text = machine::preset_text("S10").unwrap().replacen(
+        "thermal_time_s = 1.0",
+        "torque_falloff = 0.06\nfriction_coulomb_mn_m = 0.2\nfriction_viscous_un_m_s_rad = 0.3",
+        1,
+    );
+    let read = machine::read("my.toml", &text).unwrap();
+    let losses = read.scanner.losses;
+    assert_eq!((losses.torque_falloff, losses.friction_coulomb_n_m), (0.06, 0.2 * 1e-3));
+    assert_eq!(losses.friction_viscous_n_m_s_rad, 0.3 * 1e-6);
+    assert_eq!(machine::read("my.toml", &machine::to_toml(&read)).unwrap(), read);
+}
+
+#[test]
+fn axes_that_cannot_be_steered_are_refused() {
+    check(
+        "period_us = 10.0",
+        "period_us = 100",
+        expect![[
+            "my.toml:11: scanner.torsional_mode_hz = 5200.0 is outside what a period of 100 µs can steer, below 5000 Hz"
+        ]],
+    );
+    check(
+        "thermal_time_s = 1.0",
+        "torque_falloff = 0.5\nfriction_coulomb_mn_m = 25",
+        expect![[
+            "my.toml:17: scanner.friction_coulomb_mn_m = 25 is outside what the peak torque overcomes, below 24.680 mN·m"
+        ]],
+    );
+}

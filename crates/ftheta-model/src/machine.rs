@@ -48,10 +48,23 @@ pub struct Scanner {
     pub f1_uncertainty: f64,
     /// Relative uncertainty of the torque constant that plans must stand.
     pub kt_uncertainty: f64,
+    /// What makes the axis nonlinear.
+    pub losses: Losses,
     /// The position loop of the driver.
     pub servo: Servo,
     /// The position sensor.
     pub sensor: Sensor,
+}
+
+/// Torque that an axis loses to its angle and to friction; all zero is a linear axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Losses {
+    /// Relative loss of the torque constant at the greatest angle; it grows with the angle squared.
+    pub torque_falloff: f64,
+    /// Coulomb friction on the rotor, N·m.
+    pub friction_coulomb_n_m: f64,
+    /// Viscous friction on the rotor, N·m·s/rad.
+    pub friction_viscous_n_m_s_rad: f64,
 }
 
 /// The position loop inside the scanner's driver.
@@ -185,6 +198,11 @@ impl Output {
     /// Period of the samples, s.
     pub fn period_s(&self) -> f64 {
         f64::from(self.period_ns) * 1e-9
+    }
+
+    /// Greatest frequency that samples of this period can carry, Hz.
+    pub fn nyquist_hz(&self) -> f64 {
+        0.5 / self.period_s()
     }
 
     /// Greatest word, either sign.

@@ -1,6 +1,7 @@
 //! One axis under its servo: reference angle in, state of mirror and coil out, tick by tick.
 
 use crate::galvo::{CURRENT, Galvo, State, Step};
+use crate::lossy::LossyAxis;
 use crate::servo::{Gains, Memory, Seen};
 use ftheta_model::machine::Scanner;
 use nalgebra::DMatrix;
@@ -10,6 +11,8 @@ use nalgebra::DMatrix;
 pub struct AxisLoop {
     gains: Gains,
     step: Step,
+    /// Takes the place of `step` where the scanner has losses.
+    lossy: Option<LossyAxis>,
     rotor_row: State,
     /// Weights of the states in the current one tick later.
     current_row: State,
@@ -26,11 +29,14 @@ impl AxisLoop {
     /// An axis at rest in its centre.
     ///
     /// * `plant`: the axis as it is; `gains` were designed for the nominal one
+    /// * `scanner`: the driver's limits and the axis's losses; servo and driver reckon with neither
+    ///   falling torque nor friction
     pub fn new(plant: &Galvo, gains: Gains, scanner: &Scanner, tick_s: f64) -> Self {
         let step = plant.step(tick_s);
         Self {
             gains,
             step,
+            lossy: LossyAxis::new(plant, scanner, tick_s),
             rotor_row: plant.rotor_row(),
             current_row: step.a.row(CURRENT).transpose(),
             tick_s,
@@ -68,7 +74,10 @@ impl AxisLoop {
             voltage_v: acting_v,
         };
         self.pending_v = self.gains.voltage(&mut self.memory, reference_rad, &seen, self.tick_s);
-        self.state = self.step.a * self.state + self.step.b * acting_v;
+        self.state = match &self.lossy {
+            None => self.step.a * self.state + self.step.b * acting_v,
+            Some(lossy) => lossy.advance(&self.state, acting_v),
+        };
         acting_v
     }
 

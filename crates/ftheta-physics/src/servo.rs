@@ -21,6 +21,14 @@ pub enum ServoError {
         /// Longest possible, µs.
         high_us: f64,
     },
+    /// The mode is too fast for the tick.
+    #[error("torsional mode of {mode_hz:.0} Hz is too high for ticks, limit {nyquist_hz:.0} Hz")]
+    Aliased {
+        /// Frequency of the mode, Hz.
+        mode_hz: f64,
+        /// Half the rate of the ticks, Hz.
+        nyquist_hz: f64,
+    },
     /// The closed loop grows.
     #[error(
         "servo is unstable: the closed loop's greatest factor per tick is {radius:.4}, limit 1"
@@ -39,6 +47,11 @@ impl ServoError {
                 "scanner.servo.lag_us".into(),
                 format!("{lag_us:.1} µs"),
                 format!("{low_us:.1} to {high_us:.1} µs"),
+            ),
+            Self::Aliased { mode_hz, nyquist_hz } => (
+                "scanner.torsional_mode_hz".into(),
+                format!("{mode_hz:.0} Hz"),
+                format!("{nyquist_hz:.0} Hz"),
             ),
             Self::Unstable { radius } => {
                 ("scanner.servo".into(), format!("{radius:.4} per tick"), "1 per tick".into())
@@ -103,8 +116,13 @@ impl Gains {
     /// Gains for a scanner's nominal axis at a tick.
     ///
     /// # Errors
-    /// If the lag asked for is out of reach, or the loop would be unstable.
+    /// If the mode lies above half the rate of the ticks, the lag asked for is out of reach, or the
+    /// loop would be unstable.
     pub fn design(scanner: &Scanner, tick_s: f64) -> Result<Self, ServoError> {
+        let (mode_hz, nyquist_hz) = (scanner.torsional_mode_hz, 0.5 / tick_s);
+        if mode_hz >= nyquist_hz {
+            return Err(ServoError::Aliased { mode_hz, nyquist_hz });
+        }
         let galvo = Galvo::new(scanner);
         match scanner.servo {
             Servo::StateFeedback { velocity_weight_s, lag_s } => {

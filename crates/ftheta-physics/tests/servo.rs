@@ -1,7 +1,7 @@
 //! Motor and servo against the numbers of `design/measures.md` and `design/control.md`.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
-use ftheta_model::machine::{Scanner, Sensor, Servo};
+use ftheta_model::machine::{Losses, Scanner, Sensor, Servo};
 use ftheta_physics::axis_loop::{AxisLoop, spectral_radius};
 use ftheta_physics::galvo::{Galvo, State};
 use ftheta_physics::servo::{Gains, ServoError};
@@ -41,6 +41,7 @@ fn scanner(set: &str, servo: Servo) -> Scanner {
         speed_max_rad_s: 1000.0,
         f1_uncertainty: 0.03,
         kt_uncertainty: 0.005,
+        losses: Losses::default(),
         servo,
         sensor: Sensor::default(),
     }
@@ -226,4 +227,10 @@ fn impossible_servos_are_errors() {
     };
     let error = Gains::design(&scanner("S10", wild), TICK_S).unwrap_err();
     assert!(matches!(error, ServoError::Unstable { .. }), "{error}");
+}
+
+#[test]
+fn a_mode_above_half_the_tick_rate_is_refused() {
+    let error = Gains::design(&preset("S10"), 1e-4).unwrap_err();
+    assert_eq!(error.to_string(), "torsional mode of 5200 Hz is too high for ticks, limit 5000 Hz");
 }

@@ -1,7 +1,7 @@
 //! Jumps against reference limits, an independent propagator and plants off the nominal.
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
-use ftheta_model::machine::{Scanner, Sensor, Servo};
+use ftheta_model::machine::{Losses, Scanner, Sensor, Servo};
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
 use ftheta_planner::jump::{
     Atlas, AtlasOptions, Axis, AxisOptions, CurrentBound, Jump, JumpError, Model, fewest_ticks,
@@ -46,6 +46,7 @@ fn scanner(set: &str) -> Scanner {
         speed_max_rad_s: 1000.0,
         f1_uncertainty: 0.03,
         kt_uncertainty: 0.005,
+        losses: Losses::default(),
         servo: Servo::StateFeedback { velocity_weight_s: 1e-4, lag_s: 1.64e-4 },
         sensor: Sensor::default(),
     }

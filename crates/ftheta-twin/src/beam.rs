@@ -6,6 +6,7 @@ use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_model::trace::AxisStates;
 use ftheta_physics::axis_loop::AxisLoop;
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
+use ftheta_physics::lossy::LossyAxis;
 use ftheta_physics::map_table::MapTable;
 use ftheta_physics::optics::field_from_angles;
 use ftheta_physics::servo::{Gains, ServoError};
@@ -21,6 +22,9 @@ pub struct Beam {
     axes: [AxisLoop; 2],
     /// Mirror angle at each sub-step of a tick from the states at its start and the voltage.
     substeps: Vec<(State, f64)>,
+    /// Goes from sub-step to sub-step instead where the scanner has losses.
+    lossy: Option<LossyAxis>,
+    angle_row: State,
     speed_row: State,
     table: Option<MapTable>,
     machine: Machine,
@@ -61,6 +65,8 @@ impl Beam {
         Ok(Self {
             axes: [axis.clone(), axis],
             substeps,
+            lossy: LossyAxis::new(&plant, scanner, tick_s / f64::from(n_substeps)),
+            angle_row: row,
             speed_row: plant.mirror_speed_row(),
             table,
             machine: machine.clone(),
@@ -81,16 +87,23 @@ impl Beam {
     /// sub-step after its start.
     #[inline]
     pub fn tick(&mut self, command: [f64; 2], mut visit: impl FnMut(FieldPoint)) {
-        let before = [*self.axes[0].state(), *self.axes[1].state()];
+        let mut before = [*self.axes[0].state(), *self.axes[1].state()];
         for (axis, &reference_rad) in command.iter().enumerate() {
             let error_rad = self.sensor_error(axis);
             self.voltages[axis] = self.axes[axis].tick(reference_rad, error_rad);
         }
         self.n_ticks += 1;
         for index in 0..self.substeps.len() {
-            let (row, per_volt) = &self.substeps[index];
-            self.angles =
-                [0, 1].map(|axis| row.dot(&before[axis]) + per_volt * self.voltages[axis]);
+            if let Some(lossy) = &self.lossy {
+                for (state, &voltage_v) in before.iter_mut().zip(&self.voltages) {
+                    *state = lossy.advance(state, voltage_v);
+                }
+                self.angles = before.map(|state| self.angle_row.dot(&state));
+            } else {
+                let (row, per_volt) = &self.substeps[index];
+                self.angles =
+                    [0, 1].map(|axis| row.dot(&before[axis]) + per_volt * self.voltages[axis]);
+            }
             visit(self.place());
         }
     }

@@ -1,6 +1,8 @@
 //! One axis driven by voltages alone: when has the mirror arrived for good?
 
+use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
+use ftheta_physics::lossy::LossyAxis;
 
 /// What a sequence of voltages did to an axis at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,15 +38,60 @@ pub fn arrival(
     target_rad: f64,
     tolerance_rad: f64,
 ) -> Option<Arrival> {
-    let n_looks = (tick_s / LOOK_S).round().max(1.0);
-    let look_s = tick_s / n_looks;
+    let look_s = look_s(tick_s);
     let step = plant.step(look_s);
+    let played = Played { voltages_v, tick_s, target_rad, tolerance_rad };
+    settled(plant, &played, |state, voltage_v| step.a * state + step.b * voltage_v)
+}
+
+/// Voltages that are played, and where they should lead.
+#[derive(Clone, Copy, Debug)]
+pub struct Played<'a> {
+    /// Voltages, V, one per tick.
+    pub voltages_v: &'a [f64],
+    /// Length of a tick, s.
+    pub tick_s: f64,
+    /// Where the mirror should be at the end, rad.
+    pub target_rad: f64,
+    /// It has arrived within this, rad.
+    pub tolerance_rad: f64,
+}
+
+/// Like [`arrival`], on a plant that has the scanner's losses.
+pub fn arrival_with_losses(
+    plant: &Galvo,
+    scanner: &Scanner,
+    played: &Played<'_>,
+) -> Option<Arrival> {
+    match LossyAxis::new(plant, scanner, look_s(played.tick_s)) {
+        Some(lossy) => settled(plant, played, |state, voltage_v| lossy.advance(state, voltage_v)),
+        None => {
+            let Played { voltages_v, tick_s, target_rad, tolerance_rad } = *played;
+            arrival(plant, voltages_v, tick_s, target_rad, tolerance_rad)
+        }
+    }
+}
+
+/// Time between two looks, a whole part of a tick, s.
+fn look_s(tick_s: f64) -> f64 {
+    tick_s / (tick_s / LOOK_S).round().max(1.0)
+}
+
+/// Plays voltages with `advance`, which moves the states on by one look.
+fn settled(
+    plant: &Galvo,
+    played: &Played<'_>,
+    advance: impl Fn(&State, f64) -> State,
+) -> Option<Arrival> {
+    let Played { voltages_v, tick_s, target_rad, tolerance_rad } = *played;
+    let look_s = look_s(tick_s);
+    let n_looks = (tick_s / look_s).round();
     let mut state = State::zeros();
     let (mut peak_current_a, mut heat_a2s) = (0.0_f64, 0.0);
     for &voltage_v in voltages_v {
         for _ in 0..n_looks as usize {
             let before_a = state[CURRENT];
-            state = step.a * state + step.b * voltage_v;
+            state = advance(&state, voltage_v);
             let after_a = state[CURRENT];
             peak_current_a = peak_current_a.max(after_a.abs());
             // Simpson's rule for a current that is all but straight within a look.
@@ -61,7 +108,7 @@ pub fn arrival(
         if distance > tolerance_rad {
             settled_at = look + 1;
         }
-        state = step.a * state;
+        state = advance(&state, 0.0);
         distance = distance_rad(plant, &state, target_rad);
     }
     (distance <= tolerance_rad).then_some(Arrival {

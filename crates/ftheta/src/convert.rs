@@ -1,7 +1,7 @@
 //! Writes jobs in other formats.
 
 use crate::Error;
-use crate::output::Output;
+use crate::output::write_file;
 use ftheta_formats::svg_write;
 use ftheta_model::job::Job;
 use ftheta_model::recipe::Recipe;
@@ -21,11 +21,7 @@ pub fn write(job: &Job, recipe: &Recipe, path: &Path) -> Result<(), Error> {
         Some("csv") => polylines(job, recipe)?,
         _ => return Err(Error::Format { path: path.into(), expected: ".svg or .csv to write" }),
     };
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut output = Output::new(folder.unwrap_or(Path::new(".")))?;
-    output.add(&name, |out| out.write_all(content.as_bytes()))?;
-    output.publish()
+    write_file(path, content.as_bytes())
 }
 
 fn polylines(job: &Job, recipe: &Recipe) -> Result<String, Error> {

@@ -1,9 +1,11 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use ftheta_formats::motion_law::MotionLawError;
 use ftheta_formats::plan_file::PlanFileError;
 use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
+use ftheta_physics::mechanism::MechanismError;
 use ftheta_physics::servo::ServoError;
 use ftheta_planner::PlanError;
 use ftheta_planner::jump::JumpError;
@@ -102,6 +104,12 @@ pub enum Error {
     /// The plan is refused.
     #[error(transparent)]
     Audit(#[from] AuditError),
+    /// A motion law is at fault.
+    #[error(transparent)]
+    MotionLaw(#[from] MotionLawError),
+    /// A mechanism cannot be computed.
+    #[error(transparent)]
+    Mechanism(#[from] MechanismError),
     /// The machine's servo cannot be built.
     #[error(transparent)]
     Servo(#[from] ServoError),
@@ -158,6 +166,8 @@ impl Error {
                 ("--planner".into(), (*planner).into(), (*why).into())
             }
             Self::Audit(error) => error.fault(),
+            Self::MotionLaw(error) => error.fault(),
+            Self::Mechanism(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Twin(error) => ("twin".into(), error.to_string(), String::new()),
         };

@@ -1,13 +1,14 @@
 //! Jumps compared: the limits of a machine for a step, and what each law makes of it on the twin.
 
 use crate::Error;
-use ftheta_model::machine::{Machine, Scanner};
-use ftheta_physics::galvo::Galvo;
+use ftheta_model::machine::{Losses, Machine, Scanner};
+use ftheta_physics::galvo::{Galvo, State};
+use ftheta_physics::lossy::feed_forward;
 use ftheta_planner::jump::{
     Atlas, AtlasOptions, AxisOptions, CurrentBound, JumpError, Model, limit_s, settle_limit_s,
 };
 use ftheta_twin::mismatch::Mismatch;
-use ftheta_twin::open_loop::{Arrival, arrival};
+use ftheta_twin::open_loop::{Arrival, Played, arrival_with_losses};
 
 /// A way to move from rest to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,13 +118,27 @@ fn build(
     Atlas::build(scanner, AtlasOptions { axis, range_rad })
 }
 
+/// Voltages that do on an axis with losses what these do on the nominal one, V.
+fn with_losses(nominal: &Galvo, scanner: &Scanner, voltages_v: Vec<f64>, tick_s: f64) -> Vec<f64> {
+    if scanner.losses == Losses::default() {
+        return voltages_v;
+    }
+    let step = nominal.step(tick_s);
+    let mut states = vec![State::zeros()];
+    for &voltage_v in &voltages_v {
+        states.push(step.a * states[states.len() - 1] + step.b * voltage_v);
+    }
+    feed_forward(nominal, scanner, &states, &voltages_v, tick_s)
+}
+
 fn one(
     scanner: &Scanner,
     options: &JumpOptions,
     atlases: &[(Law, Atlas)],
     step_rad: f64,
 ) -> Result<StepResult, Error> {
-    let plant = options.mismatch.apply(&Galvo::new(scanner));
+    let nominal = Galvo::new(scanner);
+    let plant = options.mismatch.apply(&nominal);
     let mut laws = Vec::new();
     for &(law, ref atlas) in atlases {
         let jump = atlas.jump(step_rad).ok_or(JumpError::Parameter {
@@ -132,14 +147,19 @@ fn one(
             low: -atlas.reach_rad(),
             high: atlas.reach_rad(),
         })?;
-        let voltages_v: Vec<f64> = jump.voltages_v().collect();
+        let linear_v: Vec<f64> = jump.voltages_v().collect();
+        let voltages_v = with_losses(&nominal, scanner, linear_v, options.period_s);
         let peak_v = voltages_v.iter().fold(0.0_f64, |peak, voltage| peak.max(voltage.abs()));
         let (tick_s, tolerance_rad) = (options.period_s, options.tolerance_rad);
         laws.push(LawResult {
             law,
             plan_s: jump.n_ticks as f64 * tick_s,
             peak_voltage_ratio: peak_v / scanner.voltage_max_v,
-            arrival: arrival(&plant, &voltages_v, tick_s, step_rad, tolerance_rad),
+            arrival: arrival_with_losses(
+                &plant,
+                scanner,
+                &Played { voltages_v: &voltages_v, tick_s, target_rad: step_rad, tolerance_rad },
+            ),
         });
     }
     let settles = options.tolerance_rad < 0.5 * step_rad.abs();

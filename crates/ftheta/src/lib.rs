@@ -10,6 +10,7 @@ pub mod import;
 pub mod jump;
 pub mod machines;
 pub mod mark;
+pub mod mechanism;
 pub mod output;
 pub mod results;
 pub mod verify;

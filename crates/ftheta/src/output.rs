@@ -14,6 +14,18 @@ pub struct Output {
     pending: Vec<(NamedTempFile, PathBuf)>,
 }
 
+/// Writes one file whole; its folder is made if need be.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut output = Output::new(folder.unwrap_or(Path::new(".")))?;
+    output.add(&name, |out| out.write_all(content))?;
+    output.publish()
+}
+
 impl Output {
     /// Files for a folder, which is made if need be.
     ///

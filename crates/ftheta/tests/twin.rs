@@ -4,7 +4,7 @@
 
 use ftheta::formats::machine::preset;
 use ftheta::model::block::{Block, LaserEdge, SampleSink};
-use ftheta::model::machine::{Machine, Sensor};
+use ftheta::model::machine::{Losses, Machine, Sensor};
 use ftheta::model::space::{DacCodes, FieldPoint, MirrorAngles};
 use ftheta::model::trace::Trace;
 use ftheta::physics::axis_loop::AxisLoop;
@@ -117,4 +117,42 @@ fn beam_is_where_a_finer_simulation_puts_it() {
         }
     }
     assert!(worst_um < 0.02, "{worst_um} µm");
+}
+
+/// Falling torque and friction move the trace as they move the axis, at every tick's end.
+#[test]
+fn losses_act_on_the_beam() {
+    let mut machine = machine();
+    let word = 200_000;
+    let play = |machine: &Machine| {
+        let mut twin = twin(machine, Mismatch::default());
+        twin.push(&step_block(120, word)).unwrap();
+        twin.take_trace().points
+    };
+    let linear = play(&machine);
+    machine.scanner.losses = Losses {
+        torque_falloff: 0.06,
+        friction_coulomb_n_m: 2e-4,
+        friction_viscous_n_m_s_rad: 2e-7,
+    };
+    let points = play(&machine);
+    let plant = Galvo::new(&machine.scanner);
+    let gains = Gains::design(&machine.scanner, 1e-5).unwrap();
+    let mut axes = [(); 2].map(|()| AxisLoop::new(&plant, gains, &machine.scanner, 1e-5));
+    let step_rad = machine.output.word_step_rad();
+    let mut apart_um = 0.0;
+    for tick in 1..=120 {
+        axes[0].tick(f64::from(word) * step_rad, 0.0);
+        axes[1].tick(f64::from(-word / 2) * step_rad, 0.0);
+        let angle = [0, 1].map(|axis| plant.mirror_row().dot(axes[axis].state()));
+        let exact = field_from_angles(&machine.optics, MirrorAngles::new(angle[0], angle[1]));
+        let place = FieldPoint::from(points[5 * tick]);
+        let off_um = 1e3 * (place.x_mm - exact.x_mm).hypot(place.y_mm - exact.y_mm);
+        assert!(off_um < 0.02, "tick {tick}: {off_um} µm");
+        if tick == 40 {
+            let without = FieldPoint::from(linear[5 * tick]);
+            apart_um = 1e3 * (place.x_mm - without.x_mm).hypot(place.y_mm - without.y_mm);
+        }
+    }
+    assert!(apart_um > 10.0, "{apart_um} µm");
 }

@@ -19,6 +19,7 @@ pub fn run(arguments: &Machine, as_json: bool) -> Result<(), Error> {
         MachineAction::List => list(as_json),
         MachineAction::Show { machine } => show(machine, as_json),
         MachineAction::Check { machine } => check(machine, as_json),
+        MachineAction::Mechanism(mechanism) => super::mechanism::run(mechanism, as_json),
     }
 }
 

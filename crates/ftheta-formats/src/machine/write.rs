@@ -45,6 +45,10 @@ fn scanner(machine: &Machine, out: &mut String) {
     scaled(out, "speed_max_rad_s", scanner.speed_max_rad_s, 1.0);
     scaled(out, "f1_uncertainty", scanner.f1_uncertainty, 1.0);
     scaled(out, "kt_uncertainty", scanner.kt_uncertainty, 1.0);
+    let losses = &scanner.losses;
+    scaled(out, "torque_falloff", losses.torque_falloff, 1.0);
+    scaled(out, "friction_coulomb_mn_m", losses.friction_coulomb_n_m, 1e-3);
+    scaled(out, "friction_viscous_un_m_s_rad", losses.friction_viscous_n_m_s_rad, 1e-6);
     out.push_str("\n[scanner.servo]\n");
     match scanner.servo {
         Servo::StateFeedback { velocity_weight_s, lag_s } => {

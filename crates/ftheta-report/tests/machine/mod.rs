@@ -1,7 +1,7 @@
 //! A machine of usual size.
 
 use ftheta_model::machine::{
-    Axis, Drive, Laser, Lens, Machine, Optics, Output, Scanner, Sensor, Servo,
+    Axis, Drive, Laser, Lens, Losses, Machine, Optics, Output, Scanner, Sensor, Servo,
 };
 
 /// 24 V, 10 A, 1 000 rad/s, a spot of 30 µm.
@@ -24,6 +24,7 @@ pub fn machine() -> Machine {
             speed_max_rad_s: 1000.0,
             f1_uncertainty: 0.03,
             kt_uncertainty: 0.005,
+            losses: Losses::default(),
             servo: Servo::StateFeedback { velocity_weight_s: 7e-5, lag_s: 1.6e-4 },
             sensor: Sensor::default(),
         },
