@@ -22,6 +22,9 @@ use walk::{Command, Walk};
 /// 97.3 % of the angle.
 pub const CORRECTION_RESERVE: f64 = 0.027;
 
+/// What heat is called in messages.
+const COIL_HEAT: &str = "coil heat";
+
 /// Rounding that a ratio of 1 may carry.
 const ROUNDING: f64 = 1e-9;
 
@@ -108,6 +111,11 @@ pub enum AuditError {
 }
 
 impl AuditError {
+    /// Whether the coils are too hot, which gentler or rarer motion mends.
+    pub fn is_heat(&self) -> bool {
+        matches!(self, Self::Limit { quantity, .. } if *quantity == COIL_HEAT)
+    }
+
     /// Place, value and limit for a machine-readable message.
     pub fn fault(&self) -> (String, String, String) {
         match self {
@@ -247,7 +255,7 @@ fn refuse(
         (now.speed, free, "mirror speed", scanner.speed_max_rad_s, "rad/s"),
         (now.voltage, 1.0, "driver voltage", scanner.voltage_max_v, "V"),
         (now.current, 1.0, "coil current", scanner.current_max_a, "A"),
-        (now.heat, 1.0, "coil heat", scanner.current_rms_a * scanner.current_rms_a, "A²"),
+        (now.heat, 1.0, COIL_HEAT, scanner.current_rms_a * scanner.current_rms_a, "A²"),
     ];
     for (ratio, share, quantity, limit, unit) in rows {
         if ratio.is_nan() || ratio > share + ROUNDING {

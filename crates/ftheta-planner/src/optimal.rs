@@ -15,8 +15,9 @@ use ftheta_physics::servo::Gains;
 use kurbo::Point;
 use std::collections::BTreeMap;
 
-/// Part of the coil's steady heat that jumps may use: marks need some too.
-const HEAT_SHARE: f64 = 0.95;
+/// Parts of the coil's steady heat that jumps may use, in the order to be tried: how much the marks
+/// between them need is seen when the plan is audited.
+pub const HEAT_SHARES: [f64; 4] = [0.95, 0.85, 0.7, 0.5];
 /// Near the edge of the angles a jump is prolonged by this part at a time, so that its commands,
 /// which lead the mirror, stay within them.
 const LONGER: f64 = 1.0 / 12.0;
@@ -35,6 +36,7 @@ pub fn obstacle(machine: &Machine) -> Option<&'static str> {
 /// The content of a plan with jumps from the atlas, before the audit.
 ///
 /// * `atlas`: for this machine's scanner and period; extended as far as the jumps need
+/// * `heat_share`: one of [`HEAT_SHARES`]
 ///
 /// # Errors
 /// As [`crate::classic::draft`], and if the atlas cannot be extended.
@@ -43,9 +45,9 @@ pub fn draft(
     machine: &Machine,
     settings: &Settings,
     tolerance_mm: f64,
-    atlas: &mut Atlas,
+    (atlas, heat_share): (&mut Atlas, f64),
 ) -> Result<PlanDraft, PlanError> {
-    let jumps = Jumps::new(machine, atlas)?;
+    let jumps = Jumps::new(machine, atlas, heat_share)?;
     builder::draft(toolpath, machine, settings, tolerance_mm, Some(jumps))
 }
 
@@ -60,6 +62,7 @@ pub(crate) struct Jumps<'a> {
     sequences_v: Vec<Vec<f64>>,
     /// Filtered squared current of each axis, A².
     heat_a2: [f64; 2],
+    heat_max_a2: f64,
 }
 
 /// A jump that was chosen.
@@ -86,7 +89,7 @@ struct Used {
 }
 
 impl<'a> Jumps<'a> {
-    fn new(machine: &'a Machine, atlas: &'a mut Atlas) -> Result<Self, PlanError> {
+    fn new(machine: &'a Machine, atlas: &'a mut Atlas, heat_share: f64) -> Result<Self, PlanError> {
         Ok(Self {
             machine,
             atlas,
@@ -95,6 +98,7 @@ impl<'a> Jumps<'a> {
             used: BTreeMap::new(),
             sequences_v: Vec::new(),
             heat_a2: [0.0; 2],
+            heat_max_a2: heat_share * machine.scanner.current_rms_a.powi(2),
         })
     }
 
@@ -179,15 +183,13 @@ impl<'a> Jumps<'a> {
 
     /// Ticks until both coils stand a jump; `None` if one never does.
     fn wait(&self, rises_a2: [f64; 2]) -> Option<usize> {
-        let scanner = &self.machine.scanner;
-        let limit_a2 = HEAT_SHARE * scanner.current_rms_a * scanner.current_rms_a;
         let mut n_wait = 0.0_f64;
         for (heat_a2, rise_a2) in self.heat_a2.into_iter().zip(rises_a2) {
-            let room_a2 = limit_a2 - rise_a2;
+            let room_a2 = self.heat_max_a2 - rise_a2;
             if room_a2 <= 0.0 {
                 return None;
             }
-            let wait_s = scanner.thermal_time_s * (heat_a2 / room_a2).ln();
+            let wait_s = self.machine.scanner.thermal_time_s * (heat_a2 / room_a2).ln();
             n_wait = n_wait.max((wait_s / self.period_s()).ceil());
         }
         Some(n_wait as usize)

@@ -59,6 +59,7 @@ fn scene(curves: &[BezPath]) -> (PlanDraft, Trace) {
         pens: vec![Pen::default()],
         marks,
         vertices: Vec::new(),
+        sequences_v: Vec::new(),
         segments: Vec::new(),
     };
     (plan, trace)

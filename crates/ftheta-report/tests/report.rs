@@ -140,6 +140,7 @@ fn html() -> (String, Vec<u8>) {
         pens: vec![Pen::default(), Pen::default()],
         marks: run.marks,
         vertices: Vec::new(),
+        sequences_v: Vec::new(),
         segments: Vec::new(),
     };
     let found = score(&plan, &run.trace);
@@ -207,6 +208,7 @@ fn an_empty_run_still_has_a_report() {
         pens: Vec::new(),
         marks: Vec::new(),
         vertices: Vec::new(),
+        sequences_v: Vec::new(),
         segments: Vec::new(),
     };
     let found = score(&plan, &Trace { step_ns: 1000, ..Trace::default() });

@@ -31,6 +31,7 @@ fn plan(curves: &[BezPath]) -> PlanDraft {
         pens: vec![Pen::default()],
         marks: marks.collect(),
         vertices: Vec::new(),
+        sequences_v: Vec::new(),
         segments: Vec::new(),
     }
 }

@@ -160,9 +160,8 @@ pub fn mark(
     }
     observer(Stage::Plan);
     let settings = Settings::new(machine, &recipe.classic)?;
-    let draft = draft(toolpath, machine, &settings, options, &mut warnings)?;
-    observer(Stage::Audit);
-    let plan = Plan::new(draft)?;
+    let planning = Planning { machine, settings: &settings, options };
+    let plan = planning.plan(toolpath, &mut warnings, observer)?;
     let Played { score, dose, states } = play(&plan, options, observer)?;
     warnings.extend(shortcomings(&plan, &score));
     let times = plan_times(&plan);
@@ -170,36 +169,68 @@ pub fn mark(
     Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
 }
 
-/// The plan's content by the planner asked for, or the best that the machine allows.
-fn draft(
-    toolpath: Toolpath,
-    machine: &Machine,
-    settings: &Settings,
-    options: &MarkOptions,
-    warnings: &mut Vec<Warning>,
-) -> Result<PlanDraft, Error> {
-    let tolerance_mm = options.tolerance_mm;
-    let obstacle = optimal::obstacle(machine);
-    if let (Some(Planner::Optimal), Some(why)) = (options.planner, obstacle) {
-        return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
+/// What a toolpath is planned with.
+struct Planning<'a> {
+    machine: &'a Machine,
+    settings: &'a Settings,
+    options: &'a MarkOptions,
+}
+
+impl Planning<'_> {
+    /// The audited plan by the planner asked for, or the best that the machine allows.
+    fn plan(
+        &self,
+        toolpath: Toolpath,
+        warnings: &mut Vec<Warning>,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<Plan, Error> {
+        let Self { machine, settings, options } = *self;
+        let obstacle = optimal::obstacle(machine);
+        if let (Some(Planner::Optimal), Some(why)) = (options.planner, obstacle) {
+            return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
+        }
+        if options.planner != Some(Planner::Classic) && obstacle.is_none() {
+            return self.plan_optimal(&toolpath, warnings, observer);
+        }
+        let draft = classic::draft(toolpath, machine, settings, options.tolerance_mm)?;
+        observer(Stage::Audit);
+        Ok(Plan::new(draft)?)
     }
-    if options.planner == Some(Planner::Classic) || obstacle.is_some() {
-        return Ok(classic::draft(toolpath, machine, settings, tolerance_mm)?);
+
+    fn plan_optimal(
+        &self,
+        toolpath: &Toolpath,
+        warnings: &mut Vec<Warning>,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<Plan, Error> {
+        let Self { machine, settings, options } = *self;
+        let (scanner, tolerance_mm) = (&machine.scanner, options.tolerance_mm);
+        let epsilon_rad = JUMP_SHARE * tolerance_mm / scale_mm_per_rad(&machine.optics);
+        let axis = AxisOptions {
+            model: Model::Robust { epsilon_rad },
+            tick_s: machine.output.period_s(),
+            voltage_reserve: options.reserve,
+            current_bound: CurrentBound::Always,
+        };
+        let mut atlas = options.atlas_store.load(scanner, axis, warnings)?;
+        let mut refused = None;
+        for heat_share in optimal::HEAT_SHARES {
+            observer(Stage::Plan);
+            let n_kept = atlas.n_sequences();
+            let jumps = (&mut atlas, heat_share);
+            let draft = optimal::draft(toolpath.clone(), machine, settings, tolerance_mm, jumps)?;
+            if atlas.n_sequences() > n_kept {
+                options.atlas_store.save(scanner, &atlas, warnings);
+            }
+            observer(Stage::Audit);
+            match Plan::new(draft) {
+                Ok(plan) => return Ok(plan),
+                Err(error) if error.is_heat() => refused = Some(error),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Err(refused.expect("there is a share, and it was refused").into())
     }
-    let epsilon_rad = JUMP_SHARE * tolerance_mm / scale_mm_per_rad(&machine.optics);
-    let axis = AxisOptions {
-        model: Model::Robust { epsilon_rad },
-        tick_s: machine.output.period_s(),
-        voltage_reserve: options.reserve,
-        current_bound: CurrentBound::Always,
-    };
-    let mut atlas = options.atlas_store.load(&machine.scanner, axis, warnings)?;
-    let n_kept = atlas.n_sequences();
-    let draft = optimal::draft(toolpath, machine, settings, tolerance_mm, &mut atlas)?;
-    if atlas.n_sequences() > n_kept {
-        options.atlas_store.save(&machine.scanner, &atlas, warnings);
-    }
-    Ok(draft)
 }
 
 /// Stray energy from which on it is worth a warning.

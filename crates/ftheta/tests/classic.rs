@@ -7,6 +7,7 @@ use ftheta::formats::{machine, svg};
 use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::job::Job;
 use ftheta::model::machine::{Lens, Machine, Servo};
+use ftheta::model::plan::Planner;
 use ftheta::model::recipe::{ClassicRecipe, Interpolation, Pen, PenRule, Recipe};
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
@@ -39,6 +40,10 @@ fn run(machine: &Machine, recipe: &Recipe, options: &MarkOptions) -> Result<Mark
     mark(&job, machine, recipe, options, &mut |_| {})
 }
 
+fn classic() -> MarkOptions {
+    MarkOptions { planner: Some(Planner::Classic), ..MarkOptions::default() }
+}
+
 fn zero_delays() -> ClassicRecipe {
     ClassicRecipe {
         jump_delay_min_s: Some(0.0),
@@ -55,7 +60,7 @@ fn zero_delays() -> ClassicRecipe {
 #[test]
 fn lag_derived_delays_keep_ten_micrometres() {
     let recipe = at_speed(500.0, ClassicRecipe::default());
-    let marked = run(&preset("S10-f163"), &recipe, &MarkOptions::default()).unwrap();
+    let marked = run(&preset("S10-f163"), &recipe, &classic()).unwrap();
     let error_um = marked.score.contour_error_um.max;
     assert!(error_um < 10.0, "contour error {error_um} µm");
     assert!(marked.score.stray_energy_ratio < 0.001);
@@ -67,16 +72,16 @@ fn lag_derived_delays_keep_ten_micrometres() {
 fn zero_delays_leave_ends_short_and_corners_round() {
     let machine = preset("S10-f163");
     let recipe = at_speed(500.0, zero_delays());
-    let marked = run(&machine, &recipe, &MarkOptions::default()).unwrap();
+    let marked = run(&machine, &recipe, &classic()).unwrap();
     let lag_travel_um = 164.0e-6 * 500.0e3;
     let score = &marked.score;
     assert!(score.end_error_um.max > 0.7 * lag_travel_um, "ends {:?}", score.end_error_um);
     assert!(score.coverage_error_um.max > 15.0, "corners {:?}", score.coverage_error_um);
     // With everything right but the polygon delay, what is left is the corner alone.
     let no_polygon = ClassicRecipe { polygon_delay_s: Some(0.0), ..ClassicRecipe::default() };
-    let rounded = run(&machine, &at_speed(2000.0, no_polygon), &MarkOptions::default()).unwrap();
+    let rounded = run(&machine, &at_speed(2000.0, no_polygon), &classic()).unwrap();
     let waited = at_speed(2000.0, ClassicRecipe::default());
-    let waited = run(&machine, &waited, &MarkOptions::default()).unwrap();
+    let waited = run(&machine, &waited, &classic()).unwrap();
     let [rounded, waited] = [rounded, waited].map(|marked| marked.score.contour_error_um.max);
     assert!(rounded > 4.0 * waited, "corner {rounded} µm without, {waited} µm with delay");
 }
@@ -84,10 +89,10 @@ fn zero_delays_leave_ends_short_and_corners_round() {
 #[test]
 fn same_job_gives_same_plan_and_mismatch_only_touches_the_twin() {
     let (machine, recipe) = (preset("S14"), at_speed(1000.0, ClassicRecipe::default()));
-    let first = run(&machine, &recipe, &MarkOptions::default()).unwrap();
-    let second = run(&machine, &recipe, &MarkOptions::default()).unwrap();
+    let first = run(&machine, &recipe, &classic()).unwrap();
+    let second = run(&machine, &recipe, &classic()).unwrap();
     let mismatch = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025) };
-    let options = MarkOptions { mismatch, noise_mm: 0.001, ..MarkOptions::default() };
+    let options = MarkOptions { mismatch, noise_mm: 0.001, ..classic() };
     let other = run(&machine, &recipe, &options).unwrap();
     assert_eq!(first.plan.id(), second.plan.id());
     assert_eq!(first.plan.id(), other.plan.id());
@@ -101,7 +106,7 @@ fn marks_that_all_but_touch_are_joined() {
     let recipe = at_speed(1000.0, ClassicRecipe::default());
     let elements = r#"<path d="M10 10 h5"/><path d="M15.0000003 10 h5"/>"#;
     let job = drawing(elements, &recipe);
-    let options = MarkOptions { order: Order::Keep, ..MarkOptions::default() };
+    let options = MarkOptions { order: Order::Keep, ..classic() };
     let marked = mark(&job, &preset("S10"), &recipe, &options, &mut |_| {}).unwrap();
     assert_eq!((marked.plan.marks.len(), marked.times.n_jumps), (2, 0));
 }
@@ -110,7 +115,7 @@ fn marks_that_all_but_touch_are_joined() {
 fn noise_is_seeded() {
     let (machine, recipe) = (preset("S10"), at_speed(1000.0, ClassicRecipe::default()));
     let with_seed = |seed| {
-        let options = MarkOptions { noise_mm: 0.002, seed, ..MarkOptions::default() };
+        let options = MarkOptions { noise_mm: 0.002, seed, ..classic() };
         run(&machine, &recipe, &options).unwrap().score
     };
     assert_eq!(with_seed(7), with_seed(7));
@@ -122,18 +127,18 @@ fn noise_is_seeded() {
 #[test]
 fn ramps_and_dda_are_played() {
     let machine = preset("S10");
-    let plain = run(&machine, &at_speed(1000.0, ClassicRecipe::default()), &MarkOptions::default());
+    let plain = run(&machine, &at_speed(1000.0, ClassicRecipe::default()), &classic());
     let plain = plain.unwrap();
     let ramps = ClassicRecipe {
         acceleration_mm_s2: Some(5e6),
         deceleration_mm_s2: Some(1e7),
         ..ClassicRecipe::default()
     };
-    let ramped = run(&machine, &at_speed(1000.0, ramps), &MarkOptions::default()).unwrap();
+    let ramped = run(&machine, &at_speed(1000.0, ramps), &classic()).unwrap();
     assert!(ramped.times.mark_s > plain.times.mark_s);
     assert!(ramped.score.contour_error_um.max < plain.score.contour_error_um.max);
     let dda = ClassicRecipe { interpolation: Some(Interpolation::Dda), ..Default::default() };
-    let stepped = run(&machine, &at_speed(1000.0, dda), &MarkOptions::default()).unwrap();
+    let stepped = run(&machine, &at_speed(1000.0, dda), &classic()).unwrap();
     assert!(stepped.score.contour_error_um.max < 20.0, "{:?}", stepped.score.contour_error_um);
 }
 
@@ -149,7 +154,7 @@ fn other_servos_and_optics_are_played() {
     machine.optics.lens =
         Lens::PostObjective { mirror_distance_mm: 12.0, working_distance_mm: 180.0 };
     let recipe = at_speed(300.0, ClassicRecipe::default());
-    let marked = run(&machine, &recipe, &MarkOptions::default()).unwrap();
+    let marked = run(&machine, &recipe, &classic()).unwrap();
     assert!(marked.score.contour_error_um.max < 30.0, "{:?}", marked.score.contour_error_um);
 }
 
@@ -165,7 +170,7 @@ fn frame_of_the_field_is_within_the_limits() {
         );
         let recipe = at_speed(3000.0, ClassicRecipe::default());
         let job = svg::read(text.as_bytes(), &recipe, &svg::SvgOptions::default()).unwrap().value;
-        let options = MarkOptions { order: Order::Keep, ..MarkOptions::default() };
+        let options = MarkOptions { order: Order::Keep, ..classic() };
         let marked = mark(&job, &machine, &recipe, &options, &mut |_| {});
         assert!(marked.is_ok(), "{name}: {:?}", marked.err());
     }
@@ -217,7 +222,7 @@ proptest! {
         let options = MarkOptions {
             order: if keep { Order::Keep } else { Order::Shortest },
             mismatch: Mismatch { f1, kt, zeta: None },
-            ..MarkOptions::default()
+            ..classic()
         };
         let machine = preset(machine::PRESETS[preset_index]);
         let marked = mark(&job, &machine, &recipe, &options, &mut |_| {}).unwrap();
