@@ -1,10 +1,10 @@
 //! Transitions between moving ends, against an independent propagator and exact programs.
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
-use ftheta_model::machine::{Scanner, Sensor, Servo};
+use ftheta_model::machine::{Losses, Scanner, Sensor, Servo};
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
 use ftheta_planner::jump::{
-    Ask, Axis, AxisOptions, CurrentBound, Model, Route, Transition, Transitions,
+    Ask, Axis, AxisOptions, CurrentBound, Model, Route, Transitions, fewest_ticks_between,
 };
 
 const TICK_S: f64 = 1e-5;
@@ -28,6 +28,7 @@ fn s10() -> Scanner {
         kt_uncertainty: 0.005,
         servo: Servo::StateFeedback { velocity_weight_s: 1e-4, lag_s: 1.64e-4 },
         sensor: Sensor::default(),
+        losses: Losses::default(),
     }
 }
 
@@ -53,12 +54,12 @@ impl Random {
 }
 
 /// Checks ends and limits in steps of 2 µs.
-fn assert_sound(scanner: &Scanner, route: &Route, transition: &Transition) {
+fn assert_sound(scanner: &Scanner, route: &Route, voltages_v: impl Iterator<Item = f64>) {
     let plant = Galvo::new(scanner);
     let step = plant.step(TICK_S / 5.0);
     let mut state = State::new(route.from_rad, route.from_rad_s, 0.0, 0.0, 0.0);
     let limit = |value: f64, limit: f64| value.abs() <= limit * (1.0 + 1e-3);
-    for voltage in transition.voltages_v() {
+    for voltage in voltages_v {
         assert!(voltage.abs() <= scanner.voltage_max_v * (1.0 + 1e-9), "{route:?}: {voltage} V");
         for _ in 0..5 {
             state = step.a * state + step.b * voltage;
@@ -100,7 +101,7 @@ fn random_routes_are_planned_within_limits() {
         match transitions.plan(&route).unwrap() {
             Some(transition) => {
                 n_planned += 1;
-                assert_sound(&scanner, &route, &transition);
+                assert_sound(&scanner, &route, transition.voltages_v());
             }
             None => n_none += 1,
         }
@@ -143,4 +144,30 @@ fn fly_by_is_near_the_fewest_ticks() {
     let (mean, worst) = excess(1, 200, (0.05, 3.0), 2.0 / 0.32);
     let (_, fast) = excess(2, 200, (0.005, 3.0), 20.0 / 0.32);
     assert!(mean <= 0.02 && worst <= 0.06 && fast <= 0.10, "{mean} {worst} {fast}");
+}
+
+/// The example of patent CN105005322B at 0.32 m/rad: a laser-off loop round a corner of 90 degrees.
+///
+/// The ticks are those of `design/control.md`.
+#[test]
+fn the_loop_of_the_patent() {
+    let scanner = s10();
+    let (angle_rad, speed_rad_s) = (0.05 / 0.32, 100.0 / 0.32);
+    let route = |to_rad_s: f64| Route {
+        from_rad: angle_rad,
+        to_rad: angle_rad,
+        from_rad_s: speed_rad_s,
+        to_rad_s,
+    };
+    let routes = [route(speed_rad_s), route(-speed_rad_s)];
+    let fewest = |routes: &[Route]| {
+        let voltages_v = fewest_ticks_between(&scanner, options(Model::Flexible), routes);
+        voltages_v.unwrap().unwrap()
+    };
+    assert_eq!(fewest(&routes[..1])[0].len(), 123);
+    assert_eq!(fewest(&routes[1..])[0].len(), 63);
+    for (route, voltages_v) in routes.iter().zip(fewest(&routes)) {
+        assert_eq!(voltages_v.len(), 123);
+        assert_sound(&scanner, route, voltages_v.into_iter());
+    }
 }

@@ -245,6 +245,11 @@ impl Axis {
         voltages_v.iter().sum::<f64>() * self.tick_s / self.galvo.torque_constant
     }
 
+    /// Acceleration at the greatest current, rad/s².
+    pub(super) fn acceleration_max_rad_s2(&self) -> f64 {
+        self.galvo.torque_constant / self.galvo.inertia() * self.current_max_a
+    }
+
     /// State after the tick.
     pub(super) fn advance(&self, state: &State, voltage_v: f64) -> State {
         self.step.a * state + self.step.b * voltage_v

@@ -50,11 +50,10 @@ pub(super) fn polish(
         * INSIDE;
     voltages_v.iter_mut().for_each(|voltage| *voltage *= room);
     factor *= room;
-    let size = factor
-        * rows
-            .iter()
-            .map(|row| row.weights.dot(&(ends.end - ends.start)).abs())
-            .fold(0.0, f64::max);
+    let sizes = rows
+        .iter()
+        .map(|row| row.weights.dot(&ends.end).abs() + row.weights.dot(&ends.start).abs());
+    let size = factor * sizes.fold(0.0, f64::max);
     let met = defect(axis, ends, factor, &voltages_v, &rows).amax() <= REST * size;
     met.then_some((factor, voltages_v))
 }

@@ -65,6 +65,8 @@ pub(super) enum Way {
     Below(f64),
     /// Never farther than this before the end, rad.
     Behind(f64),
+    /// Between these, rad.
+    Within(f64, f64),
 }
 
 /// From a tick on the mirror stays near the end, for good.
@@ -437,6 +439,12 @@ impl Program<'_> {
             Way::Below(limit_rad) => {
                 for tick in 1..=layout.n_ticks {
                     rows.add(at(tick, 1.0), limit_rad / units.state[0]);
+                }
+            }
+            Way::Within(low_rad, high_rad) => {
+                for tick in 1..=layout.n_ticks {
+                    rows.add(at(tick, 1.0), high_rad / units.state[0]);
+                    rows.add(at(tick, -1.0), -low_rad / units.state[0]);
                 }
             }
             Way::Behind(limit_rad) => {
