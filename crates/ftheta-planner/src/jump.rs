@@ -14,4 +14,5 @@ mod program;
 pub use atlas::{Atlas, AtlasOptions, Jump};
 pub use axis::{Axis, AxisOptions, CurrentBound, Model, Reach};
 pub use error::JumpError;
+pub(crate) use limit::guess_s;
 pub use limit::{fewest_ticks, limit_s, settle_limit_s};

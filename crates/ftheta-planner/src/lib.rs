@@ -5,6 +5,7 @@
 pub mod classic;
 mod error;
 pub mod jump;
+pub mod law;
 pub mod render;
 
 pub use error::PlanError;
