@@ -1,4 +1,13 @@
 //! When has a mirror that still rings arrived: the energy envelope of its vibration.
+//!
+//! From the states of a model (here), from a record of the mirror's place (`analyse`), or sample by
+//! sample while it comes in (`Tracker`).
+
+mod record;
+mod tracker;
+
+pub use record::{EnvelopeError, RecordedMode, RecordedResidual, analyse};
+pub use tracker::Tracker;
 
 use crate::galvo::{Galvo, State};
 
