@@ -106,7 +106,7 @@ pub struct Verify {
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "\
 Examples:
-  ftheta jump --machine S10 --step-deg 0.1,1,5
+  ftheta jump --machine S10 --step-deg 0.1,1,5 --out jumps
   ftheta jump --machine S10 --step-deg 1 --law bisection:8 --from-rad-s 20 --to-rad-s -10
   ftheta jump --machine S14 --step-deg 1 --law robust --mismatch f1=-0.03 --reserve 0")]
 pub struct Jump {
@@ -143,6 +143,9 @@ pub struct Jump {
     #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
           value_parser = mismatch, allow_hyphen_values = true)]
     pub mismatch: Mismatch,
+    /// Folder for jump.html, the comparison in pictures.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// Laws that one name stands for.

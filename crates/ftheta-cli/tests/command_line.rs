@@ -260,6 +260,11 @@ fn jump_compares_laws_with_the_limit() {
         assert!(number(optimal, &["peak_current_ratio"]) <= 1.0);
     }
     bench.fault(&["jump", "--machine", "S10", "--step-deg", "30"]);
+    let (_, value) = bench.json(&["jump", "--step-deg", "1", "--law", "zv", "--out", "jumps"]);
+    assert_eq!(value["files"]["report"], "jumps/jump.html");
+    let page = std::fs::read_to_string(bench.path("jumps").join("jump.html")).unwrap();
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+    assert!(page.contains("1° over time"));
     let law = "bisection:8,zv";
     let arguments = ["jump", "--step-deg", "1", "--law", law, "--from-rad-s", "-3"];
     let (_, value) = bench.json(&arguments);

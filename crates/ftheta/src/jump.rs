@@ -94,7 +94,7 @@ pub fn compare(machine: &Machine, options: &JumpOptions) -> Result<Vec<StepResul
     }
     let n_laws = options.laws.len();
     let outcomes = in_parallel(options.steps_rad.len() * n_laws, |index| {
-        outcome(scanner, options, options.steps_rad[index / n_laws], options.laws[index % n_laws])
+        outcome(machine, options, options.steps_rad[index / n_laws], options.laws[index % n_laws])
     });
     let limits = in_parallel(options.steps_rad.len(), |index| {
         limits(scanner, options, options.steps_rad[index])
@@ -128,12 +128,16 @@ pub fn drive<'a>(
     }
 }
 
-fn outcome(
-    scanner: &Scanner,
+/// The motion of a law for a step.
+///
+/// # Errors
+/// If the law cannot do it.
+pub fn motion(
+    machine: &Machine,
     options: &JumpOptions,
     step_rad: f64,
     law: Law,
-) -> Result<Outcome, LawError> {
+) -> Result<Motion, LawError> {
     let request = Request {
         step_rad,
         from_rad_s: options.from_rad_s,
@@ -142,7 +146,17 @@ fn outcome(
         reserve: options.reserve,
         period_s: options.period_s,
     };
-    let motion = plan(scanner, law, &request)?;
+    plan(&machine.scanner, law, &request)
+}
+
+fn outcome(
+    machine: &Machine,
+    options: &JumpOptions,
+    step_rad: f64,
+    law: Law,
+) -> Result<Outcome, LawError> {
+    let scanner = &machine.scanner;
+    let motion = motion(machine, options, step_rad, law)?;
     let plant = options.mismatch.apply(&Galvo::new(scanner));
     let peak_v = motion.voltages_v.iter().fold(0.0_f64, |peak, voltage| peak.max(voltage.abs()));
     let drive = drive(scanner, options, step_rad, &motion);

@@ -7,6 +7,7 @@ pub mod convert;
 pub mod error;
 pub mod import;
 pub mod jump;
+pub mod jump_results;
 pub mod machines;
 pub mod mark;
 pub mod output;

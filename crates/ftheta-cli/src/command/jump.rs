@@ -4,7 +4,8 @@ use crate::arguments::Jump;
 use crate::json;
 use crate::screen::say;
 use ftheta::jump::{JumpOptions, Law, LawResult, StepResult, compare};
-use ftheta::{Error, machines};
+use ftheta::output::Output;
+use ftheta::{Error, jump_results, machines};
 use serde_json::{Value, json};
 
 /// Compares laws on a machine and prints a table.
@@ -21,7 +22,13 @@ pub fn run(arguments: &Jump, as_json: bool) -> Result<(), Error> {
         period_s,
         mismatch: arguments.mismatch,
     };
+    let mut output = arguments.out.as_deref().map(Output::new).transpose()?;
     let steps = compare(&machine, &options)?;
+    let report = output.as_ref().map(|output| output.path("jump.html"));
+    if let Some(output) = &mut output {
+        jump_results::add(output, &machine, &options, &steps)?;
+    }
+    output.map(Output::publish).transpose()?;
     let current_max_a = machine.scanner.current_max_a;
     if as_json {
         let steps: Vec<Value> = steps.iter().map(|step| object(step, current_max_a)).collect();
@@ -32,6 +39,7 @@ pub fn run(arguments: &Jump, as_json: bool) -> Result<(), Error> {
             "to_rad_s": arguments.to_rad_s,
             "reserve": arguments.reserve,
             "period_us": period_s * 1e6,
+            "files": report.map(|path| json!({ "report": path })),
             "steps": steps,
         }));
         return Ok(());
@@ -51,6 +59,9 @@ pub fn run(arguments: &Jump, as_json: bool) -> Result<(), Error> {
     );
     for step in &steps {
         step.laws.iter().for_each(|law| print(step, law, current_max_a));
+    }
+    if let Some(path) = report {
+        say!("report   {}", path.display());
     }
     Ok(())
 }
