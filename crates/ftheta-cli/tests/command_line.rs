@@ -262,7 +262,7 @@ fn jump_compares_laws_with_the_limit() {
     bench.fault(&["jump", "--machine", "S10", "--step-deg", "30"]);
     let (_, value) = bench.json(&["jump", "--step-deg", "1", "--law", "zv", "--out", "jumps"]);
     assert_eq!(value["files"]["report"], "jumps/jump.html");
-    let page = std::fs::read_to_string(bench.path("jumps").join("jump.html")).unwrap();
+    let page = fs::read_to_string(bench.path("jumps").join("jump.html")).unwrap();
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
     assert!(page.contains("1° over time"));
     let law = "bisection:8,zv";

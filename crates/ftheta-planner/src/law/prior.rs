@@ -4,7 +4,7 @@ use super::profile::Profile;
 use super::tune::Task;
 
 /// Most periods of a law.
-pub(super) const N_PERIODS_MAX: u32 = 1 << 22;
+pub(super) const N_PERIODS_MAX: u32 = 1 << 20;
 
 impl Task<'_> {
     /// Equal increments of the angle per period: speed comes in the first period and goes in the
