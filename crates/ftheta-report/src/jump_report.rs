@@ -53,6 +53,8 @@ pub struct JumpFigures {
     pub plan_s: f64,
     /// Until the mirror is there for good, s; `None` if never.
     pub total_s: Option<f64>,
+    /// Speed with which the target is passed instead, rad/s.
+    pub passing_rad_s: Option<f64>,
     /// Greatest voltage by the machine's limit.
     pub peak_voltage_ratio: f64,
     /// Greatest current by the machine's limit.
@@ -149,7 +151,11 @@ fn table(out: &mut String, input: &JumpReportInput<'_>) {
 
 fn cell(step: &JumpStep, law: &JumpLaw) -> String {
     let Ok(figures) = &law.figures else { return "–".into() };
-    let Some(total_s) = figures.total_s else { return "never".into() };
+    let Some(total_s) = figures.total_s else {
+        return figures.passing_rad_s.map_or("never".into(), |speed| {
+            format!("{:.1}, passing at {} rad/s", 1e6 * figures.plan_s, number(speed))
+        });
+    };
     let text = format!("{:.1} · {:.2}", 1e6 * total_s, total_s / step.limit_s);
     if figures.peak_voltage_ratio.max(figures.peak_current_ratio) > 1.0 + 1e-3 {
         return format!("<span style='color:var(--bad)'>{text}</span>");

@@ -26,6 +26,7 @@ fn law(name: &str, total_s: Option<f64>, curved: bool) -> JumpLaw {
     let figures = JumpFigures {
         plan_s: 2e-4,
         total_s,
+        passing_rad_s: None,
         peak_voltage_ratio: 1.0,
         peak_current_ratio: if name == "b&<" { 1.2 } else { 0.5 },
     };

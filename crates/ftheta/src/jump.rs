@@ -14,6 +14,9 @@ use std::thread;
 
 pub use ftheta_planner::law::{Aim, Law, LawError};
 
+/// A rigid part faster than this at the end does not ring but goes away, rad/s.
+const PASSING_RAD_S: f64 = 1.0;
+
 /// What is to be compared.
 #[derive(Clone, Debug)]
 pub struct JumpOptions {
@@ -72,6 +75,14 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Speed beside what was asked for with which the axis passes the target instead of arriving,
+    /// rad/s; `None` if it arrives.
+    pub fn passing_rad_s(&self, to_rad_s: f64) -> Option<f64> {
+        let beside_rad_s = self.arrival.end_rad_s - to_rad_s;
+        (self.arrival.settle_s.is_none() && beside_rad_s.abs() > PASSING_RAD_S)
+            .then_some(beside_rad_s)
+    }
+
     /// Duration of the law and time until the mirror is there for good, s; `None` if never.
     pub fn total_s(&self) -> Option<f64> {
         self.arrival.settle_s.map(|settle_s| self.motion.plan_s + settle_s)

@@ -84,6 +84,7 @@ fn pictured(machine: &Machine, options: &JumpOptions, step: &StepResult) -> Jump
             law.outcome.as_ref().map_err(ToString::to_string).map(|outcome| JumpFigures {
                 plan_s: outcome.motion.plan_s,
                 total_s: outcome.total_s(),
+                passing_rad_s: outcome.passing_rad_s(options.to_rad_s),
                 peak_voltage_ratio: outcome.peak_voltage_ratio,
                 peak_current_ratio: outcome.arrival.peak_current_a / machine.scanner.current_max_a,
             });

@@ -58,7 +58,7 @@ pub fn run(arguments: &Jump, as_json: bool) -> Result<(), Error> {
         "current"
     );
     for step in &steps {
-        step.laws.iter().for_each(|law| print(step, law, current_max_a));
+        step.laws.iter().for_each(|law| print(step, law, &options, current_max_a));
     }
     if let Some(path) = report {
         say!("report   {}", path.display());
@@ -66,7 +66,7 @@ pub fn run(arguments: &Jump, as_json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-fn print(step: &StepResult, law: &LawResult, current_max_a: f64) {
+fn print(step: &StepResult, law: &LawResult, options: &JumpOptions, current_max_a: f64) {
     let (step_deg, name) = (step.step_rad.to_degrees(), law.law.to_string());
     let (rigid_us, limit_us) = (step.limit_rigid_s * 1e6, step.limit_s * 1e6);
     let start = format!("{step_deg:8} {rigid_us:9.1} {limit_us:9.1}  {name:21}");
@@ -80,8 +80,10 @@ fn print(step: &StepResult, law: &LawResult, current_max_a: f64) {
     let total_s = outcome.total_s();
     let total = total_s.map_or("never".into(), |total_s| format!("{:.1}", total_s * 1e6));
     let ratio = total_s.map_or("-".into(), |total_s| format!("{:.3}", total_s / step.limit_s));
+    let passing = outcome.passing_rad_s(options.to_rad_s);
+    let passing = passing.map_or(String::new(), |speed| format!("  passing at {speed:.0} rad/s"));
     say!(
-        "{start} {:9.1} {total:>9} {ratio:>7} {:>7.1}% {:>7.1}%",
+        "{start} {:9.1} {total:>9} {ratio:>7} {:>7.1}% {:>7.1}%{passing}",
         outcome.motion.plan_s * 1e6,
         outcome.peak_voltage_ratio * 100.0,
         outcome.arrival.peak_current_a / current_max_a * 100.0,
