@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use ftheta::jump::Law;
+use ftheta::jump::{Law, LawError};
 use ftheta::model::plan::Planner;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
@@ -110,9 +110,11 @@ pub struct Verify {
 }
 
 #[derive(Args)]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "\
 Examples:
-  ftheta jump --machine S10 --step-deg 0.1,1,5
+  ftheta jump --machine S10 --step-deg 0.1,1,5 --out jumps
+  ftheta jump --machine S10 --step-deg 1 --law bisection:8 --from-rad-s 20 --to-rad-s -10
   ftheta jump --machine S14 --step-deg 1 --law robust --mismatch f1=-0.03 --reserve 0")]
 pub struct Jump {
     /// Preset (see `ftheta machine list`) or machine file.
@@ -122,9 +124,19 @@ pub struct Jump {
     #[arg(long, value_name = "D[,D...]", required = true, value_delimiter = ',',
           value_parser = positive)]
     pub step_deg: Vec<f64>,
-    /// Motion laws to compare.
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "all")]
-    pub law: Vec<LawName>,
+    /// Motion laws to compare, or all: optimal, robust, residual, zv, zvd, asymmetric, s-curve,
+    /// quintic, cycloid, bisection, trapezoid, fixed-step. A parameter follows a colon:
+    /// bisection:8 (segments), bisection:120:current (keeping the current's limit as well),
+    /// s-curve:fastest, quintic:fastest, cycloid:fastest (short, however long it rings).
+    #[arg(long, value_name = "NAME[,NAME...]|all", value_delimiter = ',', default_value = "all",
+          value_parser = laws)]
+    pub law: Vec<Laws>,
+    /// Speed at the start, rad/s mechanical.
+    #[arg(long, value_name = "V", default_value = "0", value_parser = number)]
+    pub from_rad_s: f64,
+    /// Speed at the end, rad/s mechanical.
+    #[arg(long, value_name = "V", default_value = "0", value_parser = number)]
+    pub to_rad_s: f64,
     /// The mirror has arrived when it stays this near to the target, degrees.
     #[arg(long, value_name = "E", default_value = "0.002", value_parser = positive)]
     pub tolerance_deg: f64,
@@ -138,28 +150,14 @@ pub struct Jump {
     #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
           value_parser = mismatch, allow_hyphen_values = true)]
     pub mismatch: Mismatch,
+    /// Folder for jump.html, the comparison in pictures.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub enum LawName {
-    /// Fewest ticks on the nominal axis.
-    Optimal,
-    /// Fewest ticks that stand the machine's uncertainty of mode and damping.
-    Robust,
-    /// Every law.
-    All,
-}
-
-impl LawName {
-    /// The laws of this name.
-    pub fn laws(self) -> &'static [Law] {
-        match self {
-            Self::Optimal => &[Law::Optimal],
-            Self::Robust => &[Law::Robust],
-            Self::All => &Law::ALL,
-        }
-    }
-}
+/// Laws that one name stands for.
+#[derive(Clone)]
+pub struct Laws(pub Vec<Law>);
 
 #[derive(Args)]
 #[command(after_help = "Example: ftheta convert logo.svg logo-curves.svg --fit 80")]
@@ -277,6 +275,15 @@ fn reserve(text: &str) -> Result<f64, String> {
 
 fn period(text: &str) -> Result<f64, String> {
     within(number(text)?, 1.0..=100.0)
+}
+
+fn laws(text: &str) -> Result<Laws, String> {
+    match text.trim() {
+        "all" => Ok(Laws(Law::ALL.to_vec())),
+        name => {
+            name.parse().map(|law| Laws(vec![law])).map_err(|error: LawError| error.to_string())
+        }
+    }
 }
 
 fn within(value: f64, range: RangeInclusive<f64>) -> Result<f64, String> {

@@ -244,7 +244,7 @@ fn usage_errors_exit_with_two() {
 fn jump_compares_laws_with_the_limit() {
     let bench = Bench::new();
     let (code, value) =
-        bench.json(&["jump", "--machine", "S10", "--step-deg", "0.1,1", "--reserve", "0"]);
+        bench.json(&["jump", "--step-deg", "0.1,1", "--reserve", "0", "--law", "optimal,robust"]);
     assert_eq!(code, 0);
     for (index, limit_us, rigid_us) in [(0, 211.6, 144.7), (1, 342.4, 328.6)] {
         let step = &value["steps"][index];
@@ -260,6 +260,21 @@ fn jump_compares_laws_with_the_limit() {
         assert!(number(optimal, &["peak_current_ratio"]) <= 1.0);
     }
     bench.fault(&["jump", "--machine", "S10", "--step-deg", "30"]);
+    let (_, value) = bench.json(&["jump", "--step-deg", "1", "--law", "zv", "--out", "jumps"]);
+    assert_eq!(value["files"]["report"], "jumps/jump.html");
+    let page = fs::read_to_string(bench.path("jumps").join("jump.html")).unwrap();
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+    assert!(page.contains("1° over time"));
+    let law = "bisection:8,zv";
+    let arguments = ["jump", "--step-deg", "1", "--law", law, "--from-rad-s", "-3"];
+    let (_, value) = bench.json(&arguments);
+    let laws = &value["steps"][0]["laws"];
+    assert_eq!((&laws[0]["law"], &laws[0]["settle_s"]), (&"bisection:8".into(), &0.0.into()));
+    assert!(laws[1]["total_s"].is_null());
+    assert!(laws[1]["reason"].as_str().unwrap().contains("from rest to rest, not from -3 to 0"));
+    for law in ["ruckig", "bisection:2"] {
+        assert_eq!(bench.run(&["jump", "--step-deg", "1", "--law", law]).status.code(), Some(2));
+    }
     assert_eq!(bench.run(&["jump", "--step-deg", "x"]).status.code(), Some(2));
 }
 

@@ -4,6 +4,7 @@
 
 pub mod audit;
 pub mod axis_loop;
+pub mod envelope;
 pub mod galvo;
 pub mod laser;
 pub mod lossy;

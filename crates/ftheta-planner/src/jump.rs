@@ -20,5 +20,6 @@ pub use axis::{Axis, AxisOptions, CurrentBound, Model, Reach};
 pub use error::JumpError;
 pub use exact::fewest_ticks_between;
 pub use fan::Ask;
+pub(crate) use limit::guess_s;
 pub use limit::{fewest_ticks, limit_s, settle_limit_s};
 pub use transition::{Route, Transition, Transitions};

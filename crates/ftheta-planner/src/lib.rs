@@ -6,6 +6,7 @@ mod builder;
 pub mod classic;
 mod error;
 pub mod jump;
+pub mod law;
 pub mod optimal;
 pub mod render;
 

@@ -1,5 +1,6 @@
 //! What the beam did against what was asked: figures, picture and report.
 
+pub mod jump_report;
 pub mod plate;
 pub mod report;
 pub mod score;
@@ -14,6 +15,7 @@ mod field_view;
 mod histogram;
 mod lettering;
 mod line_dose;
+mod plot;
 mod tally;
 mod text;
 mod track;

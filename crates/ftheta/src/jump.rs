@@ -4,20 +4,19 @@ use crate::Error;
 use ftheta_model::machine::{Losses, Machine, Scanner};
 use ftheta_physics::galvo::{Galvo, State};
 use ftheta_physics::lossy::feed_forward;
-use ftheta_planner::jump::{
-    Atlas, AtlasOptions, AxisOptions, CurrentBound, JumpError, Model, limit_s, settle_limit_s,
-};
+use ftheta_planner::jump::{JumpError, Model, limit_s, settle_limit_s};
+use ftheta_planner::law::{Motion, Request, plan};
 use ftheta_twin::mismatch::Mismatch;
-use ftheta_twin::open_loop::{Arrival, Played, arrival_with_losses};
+use ftheta_twin::open_loop::{Arrival, Drive, arrival};
+use std::num::NonZero;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
 
-/// A way to move from rest to rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Law {
-    /// Fewest ticks on the nominal axis, ending exactly at rest.
-    Optimal,
-    /// Fewest ticks that also stand the machine's uncertainty of mode and damping.
-    Robust,
-}
+pub use ftheta_planner::law::{Aim, Law, LawError};
+
+/// A rigid part faster than this at the end does not ring but goes away, rad/s.
+const PASSING_RAD_S: f64 = 1.0;
 
 /// What is to be compared.
 #[derive(Clone, Debug)]
@@ -26,6 +25,10 @@ pub struct JumpOptions {
     pub steps_rad: Vec<f64>,
     /// Laws, in the order of the result.
     pub laws: Vec<Law>,
+    /// Speed at the start, rad/s.
+    pub from_rad_s: f64,
+    /// Speed at the end, rad/s.
+    pub to_rad_s: f64,
     /// Distance from the target at which the mirror has arrived, rad.
     pub tolerance_rad: f64,
     /// Part of the voltage kept for feedback.
@@ -52,36 +55,46 @@ pub struct StepResult {
     pub laws: Vec<LawResult>,
 }
 
-/// What a law made of a step on the twin's plant, driven open loop.
+/// What became of a law.
 #[derive(Clone, Debug)]
 pub struct LawResult {
     /// The law.
     pub law: Law,
-    /// Duration of the voltages, s.
-    pub plan_s: f64,
-    /// Greatest voltage by the machine's limit.
-    pub peak_voltage_ratio: f64,
-    /// What the plant did; `None` if it had not settled after 0.25 s.
-    pub arrival: Option<Arrival>,
+    /// What it did, or why it gives no motion.
+    pub outcome: Result<Outcome, LawError>,
 }
 
-impl Law {
-    /// All laws there are.
-    pub const ALL: [Self; 2] = [Self::Optimal, Self::Robust];
+/// What a law made of a step on the twin's plant, driven open loop.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The voltages.
+    pub motion: Motion,
+    /// Greatest voltage by the machine's limit.
+    pub peak_voltage_ratio: f64,
+    /// What the plant did.
+    pub arrival: Arrival,
+}
 
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Optimal => "optimal",
-            Self::Robust => "robust",
-        }
+impl Outcome {
+    /// Speed beside what was asked for with which the axis passes the target instead of arriving,
+    /// rad/s; `None` if it arrives.
+    pub fn passing_rad_s(&self, to_rad_s: f64) -> Option<f64> {
+        let beside_rad_s = self.arrival.end_rad_s - to_rad_s;
+        (self.arrival.settle_s.is_none() && beside_rad_s.abs() > PASSING_RAD_S)
+            .then_some(beside_rad_s)
+    }
+
+    /// Duration of the law and time until the mirror is there for good, s; `None` if never.
+    pub fn total_s(&self) -> Option<f64> {
+        self.arrival.settle_s.map(|settle_s| self.motion.plan_s + settle_s)
     }
 }
 
-/// Compares laws on a machine.
+/// Compares laws on a machine; the same for any number of processors.
 ///
 /// # Errors
-/// If a step or setting is out of range, or a linear program fails.
+/// If a step or setting is out of range, or a limit cannot be computed. A law that fails is a
+/// result of its own.
 pub fn compare(machine: &Machine, options: &JumpOptions) -> Result<Vec<StepResult>, Error> {
     let scanner = &machine.scanner;
     for &step_rad in &options.steps_rad {
@@ -91,77 +104,97 @@ pub fn compare(machine: &Machine, options: &JumpOptions) -> Result<Vec<StepResul
             return Err(JumpError::Parameter { quantity, value, low: 0.0, high }.into());
         }
     }
-    let range_rad = options.steps_rad.iter().fold(0.0_f64, |range, step| range.max(step.abs()));
-    let mut atlases = Vec::new();
-    for &law in &options.laws {
-        atlases.push((law, build(scanner, options, law, range_rad)?));
-    }
-    options.steps_rad.iter().map(|&step| one(scanner, options, &atlases, step)).collect()
+    let n_laws = options.laws.len();
+    let outcomes = in_parallel(options.steps_rad.len() * n_laws, |index| {
+        outcome(machine, options, options.steps_rad[index / n_laws], options.laws[index % n_laws])
+    });
+    let limits = in_parallel(options.steps_rad.len(), |index| {
+        limits(scanner, options, options.steps_rad[index])
+    });
+    let mut outcomes = outcomes.into_iter();
+    limits
+        .into_iter()
+        .map(|limits| {
+            let outcomes = options.laws.iter().zip(outcomes.by_ref());
+            let laws = outcomes.map(|(&law, outcome)| LawResult { law, outcome }).collect();
+            Ok(StepResult { laws, ..limits? })
+        })
+        .collect()
 }
 
-fn build(
-    scanner: &Scanner,
+/// The drive that plays a motion.
+pub fn drive<'a>(
+    scanner: &'a Scanner,
     options: &JumpOptions,
-    law: Law,
-    range_rad: f64,
-) -> Result<Atlas, JumpError> {
-    let model = match law {
-        Law::Optimal => Model::Flexible,
-        Law::Robust => Model::Robust { epsilon_rad: options.tolerance_rad },
-    };
-    let axis = AxisOptions {
-        model,
-        tick_s: options.period_s,
-        voltage_reserve: options.reserve,
-        current_bound: CurrentBound::Always,
-    };
-    Atlas::build(scanner, AtlasOptions { axis, range_rad })
+    step_rad: f64,
+    motion: &'a Motion,
+) -> Drive<'a> {
+    Drive {
+        voltages_v: &motion.voltages_v,
+        hold_s: motion.hold_s,
+        rest_v: scanner.torque_constant_n_m_a * options.to_rad_s,
+        plan_s: motion.plan_s,
+        from_rad_s: options.from_rad_s,
+        target_rad: step_rad,
+        to_rad_s: options.to_rad_s,
+        scanner: Some(scanner),
+    }
 }
 
-/// Voltages that do on an axis with losses what these do on the nominal one, V.
-fn with_losses(nominal: &Galvo, scanner: &Scanner, voltages_v: Vec<f64>, tick_s: f64) -> Vec<f64> {
+/// The motion of a law for a step; on an axis with losses its voltages make up for them.
+///
+/// # Errors
+/// If the law cannot do it.
+pub fn motion(
+    machine: &Machine,
+    options: &JumpOptions,
+    step_rad: f64,
+    law: Law,
+) -> Result<Motion, LawError> {
+    let request = Request {
+        step_rad,
+        from_rad_s: options.from_rad_s,
+        to_rad_s: options.to_rad_s,
+        tolerance_rad: options.tolerance_rad,
+        reserve: options.reserve,
+        period_s: options.period_s,
+    };
+    let motion = plan(&machine.scanner, law, &request)?;
+    Ok(with_losses(&machine.scanner, options.from_rad_s, motion))
+}
+
+/// Voltages that do on an axis with losses what these do on the nominal one.
+fn with_losses(scanner: &Scanner, from_rad_s: f64, motion: Motion) -> Motion {
     if scanner.losses == Losses::default() {
-        return voltages_v;
+        return motion;
     }
-    let step = nominal.step(tick_s);
-    let mut states = vec![State::zeros()];
-    for &voltage_v in &voltages_v {
+    let nominal = Galvo::new(scanner);
+    let step = nominal.step(motion.hold_s);
+    let mut states = vec![State::new(0.0, from_rad_s, 0.0, 0.0, 0.0)];
+    for &voltage_v in &motion.voltages_v {
         states.push(step.a * states[states.len() - 1] + step.b * voltage_v);
     }
-    feed_forward(nominal, scanner, &states, &voltages_v, tick_s)
+    let voltages_v = feed_forward(&nominal, scanner, &states, &motion.voltages_v, motion.hold_s);
+    Motion { voltages_v, ..motion }
 }
 
-fn one(
-    scanner: &Scanner,
+fn outcome(
+    machine: &Machine,
     options: &JumpOptions,
-    atlases: &[(Law, Atlas)],
     step_rad: f64,
-) -> Result<StepResult, Error> {
-    let nominal = Galvo::new(scanner);
-    let plant = options.mismatch.apply(&nominal);
-    let mut laws = Vec::new();
-    for &(law, ref atlas) in atlases {
-        let jump = atlas.jump(step_rad).ok_or(JumpError::Parameter {
-            quantity: "step rad",
-            value: step_rad,
-            low: -atlas.reach_rad(),
-            high: atlas.reach_rad(),
-        })?;
-        let linear_v: Vec<f64> = jump.voltages_v().collect();
-        let voltages_v = with_losses(&nominal, scanner, linear_v, options.period_s);
-        let peak_v = voltages_v.iter().fold(0.0_f64, |peak, voltage| peak.max(voltage.abs()));
-        let (tick_s, tolerance_rad) = (options.period_s, options.tolerance_rad);
-        laws.push(LawResult {
-            law,
-            plan_s: jump.n_ticks as f64 * tick_s,
-            peak_voltage_ratio: peak_v / scanner.voltage_max_v,
-            arrival: arrival_with_losses(
-                &plant,
-                scanner,
-                &Played { voltages_v: &voltages_v, tick_s, target_rad: step_rad, tolerance_rad },
-            ),
-        });
-    }
+    law: Law,
+) -> Result<Outcome, LawError> {
+    let scanner = &machine.scanner;
+    let motion = motion(machine, options, step_rad, law)?;
+    let plant = options.mismatch.apply(&Galvo::new(scanner));
+    let peak_v = motion.voltages_v.iter().fold(0.0_f64, |peak, voltage| peak.max(voltage.abs()));
+    let drive = drive(scanner, options, step_rad, &motion);
+    let arrival = arrival(&plant, &drive, options.tolerance_rad);
+    Ok(Outcome { peak_voltage_ratio: peak_v / scanner.voltage_max_v, arrival, motion })
+}
+
+/// The limits of a step from rest to rest, laws left out.
+fn limits(scanner: &Scanner, options: &JumpOptions, step_rad: f64) -> Result<StepResult, Error> {
     let settles = options.tolerance_rad < 0.5 * step_rad.abs();
     Ok(StepResult {
         step_rad,
@@ -170,6 +203,32 @@ fn one(
         limit_settle_s: settles
             .then(|| settle_limit_s(scanner, step_rad, options.tolerance_rad))
             .transpose()?,
-        laws,
+        laws: Vec::new(),
     })
+}
+
+/// The results for indices from zero on, in order.
+fn in_parallel<T: Send>(n: usize, compute: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let n_threads = thread::available_parallelism().map_or(1, NonZero::get).min(n);
+    let next = AtomicUsize::new(0);
+    let found = Mutex::new(Vec::with_capacity(n));
+    let work = || {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= n {
+                break;
+            }
+            let result = compute(index);
+            found.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..n_threads {
+            scope.spawn(work);
+        }
+        work();
+    });
+    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    found.sort_by_key(|result| result.0);
+    found.into_iter().map(|(_, result)| result).collect()
 }

@@ -8,6 +8,7 @@ pub mod convert;
 pub mod error;
 pub mod import;
 pub mod jump;
+pub mod jump_results;
 pub mod machines;
 pub mod mark;
 pub mod mechanism;

@@ -4,7 +4,7 @@
 use ftheta_formats::machine::preset;
 use ftheta_physics::galvo::Galvo;
 use ftheta_planner::jump::{Atlas, AtlasOptions, AxisOptions, CurrentBound, Model};
-use ftheta_twin::open_loop::arrival;
+use ftheta_twin::open_loop::{Drive, arrival};
 
 const TICK_S: f64 = 1e-5;
 
@@ -30,9 +30,17 @@ fn robust_jumps_settle_at_once_on_every_plant() {
                     let nominal = Galvo::new(&scanner);
                     let omega = nominal.omega * (1.0 + f1);
                     let plant = Galvo { omega, damping_ratio, ..nominal };
-                    let voltages_v = &atlas.sequences_v()[n_ticks];
-                    let found = arrival(&plant, voltages_v, TICK_S, step_rad, tolerance_rad);
-                    let settle_s = found.map(|arrival| arrival.settle_s);
+                    let drive = Drive {
+                        voltages_v: &atlas.sequences_v()[n_ticks],
+                        hold_s: TICK_S,
+                        rest_v: 0.0,
+                        plan_s: n_ticks as f64 * TICK_S,
+                        from_rad_s: 0.0,
+                        target_rad: step_rad,
+                        to_rad_s: 0.0,
+                        scanner: None,
+                    };
+                    let settle_s = arrival(&plant, &drive, tolerance_rad).settle_s;
                     if settle_s != Some(0.0) {
                         failures
                             .push(format!("{name} {n_ticks} {f1} {damping_ratio} {settle_s:?}"));

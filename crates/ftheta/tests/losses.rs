@@ -2,12 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
 use ftheta::formats::machine::preset;
-use ftheta::jump::{JumpOptions, Law, compare};
+use ftheta::jump::{JumpOptions, Law, compare, drive, motion};
 use ftheta::model::machine::Losses;
 use ftheta::physics::galvo::Galvo;
-use ftheta::planner::jump::{Atlas, AtlasOptions, AxisOptions, CurrentBound, Model};
 use ftheta::twin::mismatch::Mismatch;
-use ftheta::twin::open_loop::{Played, arrival_with_losses};
+use ftheta::twin::open_loop::arrival;
 
 #[test]
 fn a_corrected_jump_arrives_where_the_plain_one_does_not() {
@@ -21,26 +20,21 @@ fn a_corrected_jump_arrives_where_the_plain_one_does_not() {
     let options = JumpOptions {
         steps_rad: vec![step_rad],
         laws: vec![Law::Optimal],
+        from_rad_s: 0.0,
+        to_rad_s: 0.0,
         tolerance_rad,
         reserve: 0.12,
         period_s: 1e-5,
         mismatch: Mismatch::default(),
     };
     let found = compare(&machine, &options).unwrap();
-    let corrected = found[0].laws[0].arrival.unwrap();
-    let axis = AxisOptions {
-        model: Model::Flexible,
-        tick_s: 1e-5,
-        voltage_reserve: 0.12,
-        current_bound: CurrentBound::Always,
-    };
-    let scanner = &machine.scanner;
-    let atlas = Atlas::build(scanner, AtlasOptions { axis, range_rad: step_rad }).unwrap();
-    let voltages_v: Vec<f64> = atlas.jump(step_rad).unwrap().voltages_v().collect();
-    let played =
-        Played { voltages_v: &voltages_v, tick_s: 1e-5, target_rad: step_rad, tolerance_rad };
-    let plain = arrival_with_losses(&Galvo::new(scanner), scanner, &played);
-    println!("corrected {corrected:?}, plain {plain:?}");
-    assert!(corrected.residual_rad < tolerance_rad && corrected.settle_s == 0.0, "{corrected:?}");
-    assert!(plain.is_none_or(|plain| plain.settle_s > 0.0), "{plain:?}");
+    let corrected = found[0].laws[0].outcome.as_ref().unwrap().arrival;
+    // The same without its losses in mind, played on the axis that has them.
+    let lossless = preset("S10").unwrap().unwrap();
+    let motion = motion(&lossless, &options, step_rad, Law::Optimal).unwrap();
+    let played = drive(&machine.scanner, &options, step_rad, &motion);
+    let plain = arrival(&Galvo::new(&machine.scanner), &played, tolerance_rad);
+    assert!(corrected.residual_rad < tolerance_rad, "{corrected:?}");
+    assert_eq!(corrected.settle_s, Some(0.0), "{corrected:?}");
+    assert_ne!(plain.settle_s, Some(0.0), "{plain:?}");
 }

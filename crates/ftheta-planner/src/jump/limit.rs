@@ -155,7 +155,7 @@ fn check_step(step_rad: f64) -> Result<(), JumpError> {
 
 /// Rough time of a step, s: the greater of what current and voltage alone allow
 /// (`design/control.md` D3).
-fn guess_s(scanner: &Scanner, step_rad: f64) -> f64 {
+pub(crate) fn guess_s(scanner: &Scanner, step_rad: f64) -> f64 {
     let gain = scanner.torque_constant_n_m_a / scanner.inertia_kg_m2();
     let by_current = 2.0 * (step_rad / (gain * scanner.current_max_a)).sqrt();
     let jerk = gain * scanner.voltage_max_v / scanner.inductance_h;
