@@ -54,7 +54,7 @@ const SMOOTH: [&str; 9] = [
 ];
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(30))]
 
     #[test]
     fn limits_hold_and_the_end_is_reached_on_any_machine(

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
 use ftheta::formats::machine;
-use ftheta::jump::{JumpOptions, Law, LawError, Outcome, StepResult, compare};
+use ftheta::jump::{JumpOptions, Law, LawError, Outcome, StepResult, compare, motion};
 use ftheta::model::machine::Machine;
 use ftheta::physics::galvo::{CURRENT, Galvo, State};
 use ftheta::twin::mismatch::Mismatch;
@@ -234,8 +234,8 @@ proptest! {
             steps_rad: vec![exponent.exp2().to_radians()],
             ..options(&[&law], &[])
         };
-        let step = &compare(&machine, &options).unwrap()[0];
-        let motion = &outcome(step, 0).motion;
+        let step_rad = options.steps_rad[0];
+        let motion = motion(&machine, &options, step_rad, options.laws[0]).unwrap();
         let plant = Galvo::new(&machine.scanner).step(motion.hold_s);
         let mut state = State::new(0.0, from_rad_s, 0.0, 0.0, 0.0);
         for voltage_v in &motion.voltages_v {
@@ -245,7 +245,7 @@ proptest! {
                 prop_assert!(state[CURRENT].abs() <= machine.scanner.current_max_a * (1.0 + 1e-6));
             }
         }
-        let lack = state - State::new(step.step_rad, to_rad_s, 0.0, 0.0, 0.0);
+        let lack = state - State::new(step_rad, to_rad_s, 0.0, 0.0, 0.0);
         prop_assert!(lack[0].abs() < 1e-9 && lack[2].abs() < 1e-9 && lack[CURRENT].abs() < 1e-6);
         prop_assert!(lack[1].abs() < 1e-5 && lack[3].abs() < 1e-4, "{lack}");
     }
