@@ -45,7 +45,9 @@ fn ci() -> Result<(), String> {
 fn test() -> Result<(), String> {
     cargo(&["test", "--release", "--workspace", "--all-targets"])?;
     cargo(&["test", "--release", "--workspace", "--doc"])?;
-    cargo(&["run", "--release", "--package", "ftheta", "--example", "01_mark_svg"])?;
+    for example in ["01_mark_svg", "03_patent_loop"] {
+        cargo(&["run", "--release", "--package", "ftheta", "--example", example])?;
+    }
     let out = root().join("target/xtask-mark");
     let out = out.to_string_lossy();
     cargo(&["run", "--release", "--", "mark", "gallery/panel.svg", "--out", &out])

@@ -16,7 +16,9 @@ mod tune;
 
 pub use error::LawError;
 
-use crate::jump::{Axis, AxisOptions, CurrentBound, Model, fewest_ticks};
+use crate::jump::{
+    Axis, AxisOptions, CurrentBound, Model, Route, fewest_ticks, fewest_ticks_between,
+};
 use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::Galvo;
 use profile::Profile;
@@ -33,9 +35,6 @@ pub enum Law {
     /// Fewest ticks on the nominal axis, ending exactly at rest.
     Optimal,
     /// Fewest ticks that also stand the machine's uncertainty of mode and damping.
-    ///
-    /// Its program takes the current as given. Driven by voltage alone, the mode's own back-EMF
-    /// changes that current, and the end may be off by up to twice the tolerance.
     Robust,
     /// Equal segments of constant voltage, the action time found by bisection.
     ///
@@ -96,6 +95,13 @@ pub struct Request {
     pub period_s: f64,
 }
 
+impl Request {
+    /// Whether both ends are at rest.
+    fn is_at_rest(&self) -> bool {
+        self.from_rad_s == 0.0 && self.to_rad_s == 0.0
+    }
+}
+
 /// Voltages that carry out a law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
@@ -130,7 +136,8 @@ pub fn plan(scanner: &Scanner, law: Law, request: &Request) -> Result<Motion, La
     }
 }
 
-/// The fewest ticks from rest to rest.
+/// The fewest ticks; between moving ends on a way that lies as far on one side of the centre as on
+/// the other.
 fn ticks(scanner: &Scanner, model: Model, request: &Request) -> Result<Motion, LawError> {
     let options = AxisOptions {
         model,
@@ -138,6 +145,21 @@ fn ticks(scanner: &Scanner, model: Model, request: &Request) -> Result<Motion, L
         voltage_reserve: request.reserve,
         current_bound: CurrentBound::Always,
     };
+    if !request.is_at_rest() {
+        let route = Route {
+            from_rad: -0.5 * request.step_rad,
+            to_rad: 0.5 * request.step_rad,
+            from_rad_s: request.from_rad_s,
+            to_rad_s: request.to_rad_s,
+        };
+        let found = fewest_ticks_between(scanner, options, &[route])?.and_then(|mut v| v.pop());
+        let voltages_v = found.ok_or(LawError::NoRoom {
+            step_rad: request.step_rad,
+            angle_max_rad: scanner.angle_max_rad,
+        })?;
+        let plan_s = voltages_v.len() as f64 * request.period_s;
+        return Ok(Motion { plan_s, hold_s: request.period_s, voltages_v });
+    }
     let n_ticks = fewest_ticks(scanner, options, request.step_rad)?;
     let longest = Axis::new(scanner, options)?.longest(n_ticks)?;
     let mut voltages_v = Vec::new();
@@ -225,8 +247,8 @@ fn check(scanner: &Scanner, law: Law, request: &Request) -> Result<(), LawError>
             return Err(LawError::Parameter { law: law.to_string(), quantity, value, low, high });
         }
     }
-    let rest = request.from_rad_s == 0.0 && request.to_rad_s == 0.0;
-    if rest || matches!(law, Law::Bisection { .. }) {
+    let moves = matches!(law, Law::Bisection { .. } | Law::Optimal | Law::Robust);
+    if moves || request.is_at_rest() {
         return Ok(());
     }
     Err(LawError::RestOnly {

@@ -1,7 +1,7 @@
 //! Motion laws on machines of any kind: limits at every sample, the end state, no panic.
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
-use ftheta_model::machine::{Scanner, Sensor, Servo};
+use ftheta_model::machine::{Losses, Scanner, Sensor, Servo};
 use ftheta_physics::envelope::{distance_rad, mode_rad};
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
 use ftheta_planner::law::{Law, LawError, Request, plan};
@@ -27,6 +27,7 @@ fn scanner(inertia: f64, frequency: f64, electric: f64, damping_ratio: f64) -> S
         kt_uncertainty: 0.005,
         servo: Servo::StateFeedback { velocity_weight_s: 1e-4, lag_s: 1.64e-4 },
         sensor: Sensor::default(),
+        losses: Losses::default(),
     }
 }
 

@@ -1,7 +1,10 @@
 //! Jumps compared in one HTML page: times of all laws, and what the axis does under some.
 
 mod curves;
+mod route;
 mod times;
+
+pub use route::{RouteReportInput, route_report_html};
 
 use crate::text::{escaped, number, put};
 use ftheta_model::machine::Machine;
@@ -89,23 +92,8 @@ const COLORS: [&str; 12] = [
 /// The page as one HTML document without scripts or references to anything outside it.
 pub fn jump_report_html(input: &JumpReportInput<'_>) -> String {
     let mut out = String::with_capacity(1 << 20);
-    let name = escaped(&input.machine.name);
-    put(
-        &mut out,
-        format_args!(
-            "<!doctype html>\n<html lang=en><head><meta charset=utf-8>\
-             <meta name=viewport content='width=device-width, initial-scale=1'>\
-             <title>Jumps of {name} – ftheta</title><style>{}</style></head><body>\
-             <header><div class=brand>ftheta · jumps</div><h1>Jumps of {name}</h1>\
-             <dl class=facts>",
-            include_str!("report.css")
-        ),
-    );
-    for (what, value) in input.settings {
-        let (what, value) = (escaped(what), escaped(value));
-        put(&mut out, format_args!("<div><dt>{what}</dt><dd>{value}</dd></div>"));
-    }
-    out.push_str("</dl></header>");
+    let title = format!("Jumps of {}", input.machine.name);
+    header(&mut out, &title, input.settings);
     times::chart(&mut out, input);
     table(&mut out, input);
     for step in input.steps {
@@ -116,6 +104,27 @@ pub fn jump_report_html(input: &JumpReportInput<'_>) -> String {
          tolerance, on the twin’s plant driven open loop.</footer></body></html>\n",
     );
     out
+}
+
+/// Everything up to the first section.
+fn header(out: &mut String, title: &str, settings: &[(String, String)]) {
+    let title = escaped(title);
+    put(
+        out,
+        format_args!(
+            "<!doctype html>\n<html lang=en><head><meta charset=utf-8>\
+             <meta name=viewport content='width=device-width, initial-scale=1'>\
+             <title>{title} – ftheta</title><style>{}</style></head><body>\
+             <header><div class=brand>ftheta · jumps</div><h1>{title}</h1>\
+             <dl class=facts>",
+            include_str!("report.css")
+        ),
+    );
+    for (what, value) in settings {
+        let (what, value) = (escaped(what), escaped(value));
+        put(out, format_args!("<div><dt>{what}</dt><dd>{value}</dd></div>"));
+    }
+    out.push_str("</dl></header>");
 }
 
 /// All laws side by side: total time and its ratio to the limit.

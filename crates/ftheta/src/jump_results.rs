@@ -4,11 +4,16 @@ use crate::Error;
 use crate::jump::{JumpOptions, Law, LawResult, StepResult, drive, motion};
 use crate::output::Output;
 use ftheta_model::machine::Machine;
+use ftheta_model::space::MirrorAngles;
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
+use ftheta_physics::optics::field_from_angles;
+use ftheta_planner::jump::Route;
 use ftheta_planner::law::{Aim, Motion};
 use ftheta_report::jump_report::{
-    JumpFigures, JumpLaw, JumpReportInput, JumpSample, JumpStep, jump_report_html,
+    JumpFigures, JumpLaw, JumpReportInput, JumpSample, JumpStep, RouteReportInput,
+    jump_report_html, route_report_html,
 };
+use ftheta_twin::mismatch::Mismatch;
 use ftheta_twin::open_loop::play;
 
 /// Laws whose curves are drawn, the first that are there; more would hide each other.
@@ -47,6 +52,57 @@ pub fn add(
         steps: &shown,
     };
     output.add("jump.html", |out| out.write_all(jump_report_html(&input).as_bytes()))
+}
+
+/// Adds the report of two axes between moving ends, played on the nominal axes.
+///
+/// * `name`: of the file, ending in .html
+/// * `voltages_v`: of each axis, one per tick, equally many
+///
+/// # Errors
+/// If it cannot be written.
+pub fn add_route(
+    output: &mut Output,
+    name: &str,
+    title: &str,
+    machine: &Machine,
+    (routes, voltages_v): (&[Route; 2], &[Vec<f64>]),
+) -> Result<(), Error> {
+    let hold_s = machine.output.period_s();
+    let plan_s = voltages_v.first().map_or(0, Vec::len) as f64 * hold_s;
+    let axis = |(route, voltages_v): (&Route, &Vec<f64>)| {
+        let options = JumpOptions {
+            steps_rad: Vec::new(),
+            laws: Vec::new(),
+            from_rad_s: route.from_rad_s,
+            to_rad_s: route.to_rad_s,
+            tolerance_rad: 0.0,
+            reserve: 0.0,
+            period_s: hold_s,
+            mismatch: Mismatch::default(),
+        };
+        let motion = Motion { plan_s, hold_s, voltages_v: voltages_v.clone() };
+        let mut samples = played(machine, &options, route.to_rad - route.from_rad, &motion, plan_s);
+        samples.iter_mut().for_each(|sample| sample.angle_rad += route.from_rad);
+        samples
+    };
+    let axes: Vec<Vec<JumpSample>> = routes.iter().zip(voltages_v).map(axis).collect();
+    let [x, y] = &axes[..] else {
+        return Ok(());
+    };
+    let place = |(x, y): (&JumpSample, &JumpSample)| {
+        let place = field_from_angles(&machine.optics, MirrorAngles::new(x.angle_rad, y.angle_rad));
+        (place.x_mm, place.y_mm)
+    };
+    let path_mm: Vec<(f64, f64)> = x.iter().zip(y).map(place).collect();
+    let settings = [
+        ("Machine".to_owned(), machine.name.clone()),
+        ("Duration".to_owned(), format!("{:.0} µs", plan_s * 1e6)),
+        ("Period".to_owned(), format!("{:.1} µs", hold_s * 1e6)),
+    ];
+    let input =
+        RouteReportInput { title, machine, settings: &settings, axes: [x, y], path_mm: &path_mm };
+    output.add(name, |out| out.write_all(route_report_html(&input).as_bytes()))
 }
 
 fn settings(options: &JumpOptions) -> Vec<(String, String)> {

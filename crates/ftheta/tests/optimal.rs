@@ -134,7 +134,7 @@ fn the_audit_refuses_jumps_that_are_not_what_they_say() {
     assert!(matches!(restless, AuditError::Limit { .. }), "{restless}");
     let malformed: [&dyn Fn(&mut PlanDraft); 4] = [
         &|draft| drop(draft.sequences_v.pop()),
-        &|draft| drop(draft.sequences_v[0].pop()),
+        &|draft| draft.sequences_v[0].truncate(3),
         &|draft| draft.sequences_v[0].fill(0.0),
         &|draft| draft.sequences_v[0][3] = f64::NAN,
     ];

@@ -49,6 +49,17 @@ pub enum LawError {
         /// Speed at the end, rad/s.
         to_rad_s: f64,
     },
+    /// The angles leave no room to stop and turn.
+    #[error(
+        "no motion of up to 2000 ticks takes the step of {step_rad} rad about the centre between \
+         these speeds within ±{angle_max_rad} rad"
+    )]
+    NoRoom {
+        /// The step, rad.
+        step_rad: f64,
+        /// Greatest angle, either sign, rad.
+        angle_max_rad: f64,
+    },
     /// More periods than are allowed would be needed.
     #[error("{law}: a step of {step_rad} rad needs more than {limit} periods of {period_us} µs")]
     TooLong {

@@ -4,6 +4,7 @@ use super::{COLORS, JumpLaw, JumpReportInput, JumpSample, JumpStep};
 use crate::chart::{Chart, Series};
 use crate::plot::{Named, Plot};
 use crate::text::{escaped, number, put};
+use ftheta_model::machine::Machine;
 
 /// The arrival is shown from this part of the limit on.
 const ARRIVAL_FROM: f64 = 0.75;
@@ -29,9 +30,23 @@ pub(super) fn step(out: &mut String, input: &JumpReportInput<'_>, step: &JumpSte
         put(out, format_args!("<span><i style='color:{color}'></i>{name}</span>"));
     }
     out.push_str("<span><i class=dash style='color:#b3261e'></i>limit of the machine</span></div>");
-    let end_s = shown.iter().filter_map(|(law, _)| law.samples.last()).map(|s| s.time_s);
+    let samples: Vec<(&[JumpSample], &'static str)> =
+        shown.iter().map(|(law, color)| (&law.samples[..], *color)).collect();
+    let end_us = quantities(out, input.machine, &samples);
+    arrival(out, input, step, &shown, end_us);
+    path(out, step, &shown);
+    out.push_str("</section>");
+}
+
+/// Appends position, speed, acceleration, voltage and current over time; returns the last time, µs.
+pub(super) fn quantities(
+    out: &mut String,
+    machine: &Machine,
+    shown: &[(&[JumpSample], &'static str)],
+) -> f64 {
+    let end_s = shown.iter().filter_map(|(samples, _)| samples.last()).map(|s| s.time_s);
     let end_us = 1e6 * end_s.fold(0.0, f64::max);
-    let scanner = &input.machine.scanner;
+    let scanner = &machine.scanner;
     type Quantity = fn(&JumpSample) -> f64;
     let rows: [(&str, Quantity, Option<f64>); 5] = [
         ("position, °", |s| s.angle_rad.to_degrees(), None),
@@ -41,8 +56,8 @@ pub(super) fn step(out: &mut String, input: &JumpReportInput<'_>, step: &JumpSte
         ("current, A", |s| s.current_a, Some(scanner.current_max_a)),
     ];
     for (i, (y_label, quantity, limit)) in rows.into_iter().enumerate() {
-        let line = |(law, color): &(&JumpLaw, &'static str)| {
-            let points = law.samples.iter().map(|s| (1e6 * s.time_s, quantity(s))).collect();
+        let line = |(samples, color): &(&[JumpSample], &'static str)| {
+            let points = samples.iter().map(|s| (1e6 * s.time_s, quantity(s))).collect();
             Series { points, color }
         };
         let series: Vec<Series> = shown.iter().map(line).collect();
@@ -50,9 +65,7 @@ pub(super) fn step(out: &mut String, input: &JumpReportInput<'_>, step: &JumpSte
         let chart = Chart { series: &series, y_label, x_label, x_range: (0.0, end_us), limit };
         out.push_str(&chart.svg());
     }
-    arrival(out, input, step, &shown, end_us);
-    path(out, step, &shown);
-    out.push_str("</section>");
+    end_us
 }
 
 /// The last of the way on the scale of the tolerance.
