@@ -176,11 +176,19 @@ impl Plot<'_> {
 
     /// The names at the right, moved apart where they would cover each other.
     fn draw_names(&self, out: &mut String, frame: &Frame, mut names: Vec<(f64, usize)>) {
-        names.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut above = frame.bottom + NAME_PX;
-        for (wanted, index) in names {
-            let y = wanted.min(above - NAME_PX);
-            above = y;
+        // Down from the top, each at its line's end or below the one before, then up from the foot.
+        names.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut free = TOP;
+        for (y, _) in &mut names {
+            *y = y.max(free);
+            free = *y + NAME_PX;
+        }
+        let mut free = frame.bottom;
+        for (y, _) in names.iter_mut().rev() {
+            *y = y.min(free);
+            free = *y - NAME_PX;
+        }
+        for (y, index) in names {
             let line = &self.lines[index];
             put(
                 out,
