@@ -147,8 +147,8 @@ fn every_nominal_sequence_is_exact() {
 }
 
 /// The reference drives every plant with one current. Driven by voltage, another mode changes the
-/// current by what it pushes back, and the rigid part then creeps; to keep that within the tolerance
-/// too costs the longest jumps these ticks more.
+/// current by what it pushes back, and the rigid part then creeps; to keep that within the
+/// tolerance too costs the longest jumps these ticks more.
 const TICKS_FOR_CREEP: [(&str, &str, u64); 3] =
     [("S14", "20", 1), ("S25", "10", 1), ("S25", "20", 7)];
 

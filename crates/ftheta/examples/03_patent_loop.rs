@@ -1,5 +1,5 @@
-//! The example of patent CN105005322B: a laser-off loop that turns the beam by 90 degrees at 100 m/s
-//! in the field, in the fewest ticks that both axes have in common.
+//! The example of patent CN105005322B: a laser-off loop that turns the beam by 90 degrees at
+//! 100 m/s in the field, in the fewest ticks that both axes have in common.
 //!
 //! Writes `patent-loop.html`, into the folder that is its argument or `target/patent-loop`.
 

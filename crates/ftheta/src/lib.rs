@@ -13,6 +13,7 @@ pub mod machines;
 pub mod mark;
 pub mod mechanism;
 pub mod output;
+mod planning;
 pub mod results;
 pub mod verify;
 

@@ -2,20 +2,18 @@
 
 use crate::Error;
 use crate::atlas_store::AtlasStore;
+use crate::planning::Planning;
 use ftheta_model::block::{Block, SampleSink};
 use ftheta_model::dose::DoseMap;
 use ftheta_model::job::Job;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, Planner};
 use ftheta_model::recipe::Recipe;
-use ftheta_model::toolpath::Toolpath;
 use ftheta_model::trace::AxisStates;
 use ftheta_model::warning::{Imported, Warning};
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
-use ftheta_planner::classic::{self, Settings};
-use ftheta_planner::jump::{AxisOptions, CurrentBound, Model};
-use ftheta_planner::optimal;
+use ftheta_planner::classic::Settings;
 use ftheta_planner::render::Renderer;
 use ftheta_report::score::{Score, Scorer};
 use ftheta_toolpath::lay::{LayOptions, Order, lay};
@@ -50,12 +48,9 @@ pub struct MarkOptions {
 /// Part of the voltage that planned jumps keep for feedback, unless told otherwise.
 pub const RESERVE: f64 = 0.12;
 
-/// Part of the tolerance that may be left of a jump when a mark begins (`design/control.md`).
-const JUMP_SHARE: f64 = 1.0 / 3.0;
-
 impl Default for MarkOptions {
-    /// Pens' own speed, the best planner, 12 % reserve, no store, 10 µm, shortest order, no clipping,
-    /// no mismatch, no noise, seed 1.
+    /// Pens' own speed, the best planner, 12 % reserve, no store, 10 µm, shortest order, no
+    /// clipping, no mismatch, no noise, seed 1.
     fn default() -> Self {
         Self {
             speed_mm_s: None,
@@ -167,70 +162,6 @@ pub fn mark(
     let times = plan_times(&plan);
     let seed = options.seed;
     Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
-}
-
-/// What a toolpath is planned with.
-struct Planning<'a> {
-    machine: &'a Machine,
-    settings: &'a Settings,
-    options: &'a MarkOptions,
-}
-
-impl Planning<'_> {
-    /// The audited plan by the planner asked for, or the best that the machine allows.
-    fn plan(
-        &self,
-        toolpath: Toolpath,
-        warnings: &mut Vec<Warning>,
-        observer: &mut dyn FnMut(Stage),
-    ) -> Result<Plan, Error> {
-        let Self { machine, settings, options } = *self;
-        let obstacle = optimal::obstacle(machine);
-        if let (Some(Planner::Optimal), Some(why)) = (options.planner, obstacle) {
-            return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
-        }
-        if options.planner != Some(Planner::Classic) && obstacle.is_none() {
-            return self.plan_optimal(&toolpath, warnings, observer);
-        }
-        let draft = classic::draft(toolpath, machine, settings, options.tolerance_mm)?;
-        observer(Stage::Audit);
-        Ok(Plan::new(draft)?)
-    }
-
-    fn plan_optimal(
-        &self,
-        toolpath: &Toolpath,
-        warnings: &mut Vec<Warning>,
-        observer: &mut dyn FnMut(Stage),
-    ) -> Result<Plan, Error> {
-        let Self { machine, settings, options } = *self;
-        let (scanner, tolerance_mm) = (&machine.scanner, options.tolerance_mm);
-        let epsilon_rad = JUMP_SHARE * tolerance_mm / scale_mm_per_rad(&machine.optics);
-        let axis = AxisOptions {
-            model: Model::Robust { epsilon_rad },
-            tick_s: machine.output.period_s(),
-            voltage_reserve: options.reserve,
-            current_bound: CurrentBound::Always,
-        };
-        let mut atlas = options.atlas_store.load(scanner, axis, warnings)?;
-        let mut refused = None;
-        for heat_share in optimal::HEAT_SHARES {
-            observer(Stage::Plan);
-            let n_kept = atlas.n_sequences();
-            let jumps = (&mut atlas, heat_share);
-            let draft = optimal::draft(toolpath.clone(), machine, settings, tolerance_mm, jumps)?;
-            if atlas.n_sequences() > n_kept {
-                options.atlas_store.save(scanner, &atlas, warnings);
-            }
-            observer(Stage::Audit);
-            match Plan::new(draft) {
-                Ok(plan) => return Ok(plan),
-                Err(error) if error.is_heat() => refused = Some(error),
-                Err(error) => return Err(error.into()),
-            }
-        }
-        Err(refused.expect("there is a share, and it was refused").into())
-    }
 }
 
 /// Stray energy from which on it is worth a warning.
@@ -352,7 +283,7 @@ pub fn plan_times(plan: &PlanDraft) -> PlanTimes {
                 }
             }
             (None, Motion::Travel { .. } | Motion::Jump { .. }) => {
-                times.n_jumps += usize::from(between)
+                times.n_jumps += usize::from(between);
             }
             (None, Motion::Hold { .. }) if between => {
                 times.delay_s += f64::from(segment.n_ticks) * plan.machine.output.period_s();

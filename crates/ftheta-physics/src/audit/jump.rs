@@ -1,4 +1,4 @@
-//! Planned jumps in the audit: the commands that follow from the voltages, and the rest they end in.
+//! Planned jumps in the audit: the commands that follow from the voltages, and the rest at the end.
 
 use super::AuditError;
 use crate::galvo::{CURRENT, Galvo, State, Step};
@@ -89,8 +89,8 @@ fn target_rad(sequence_v: &[f64], galvo: &Galvo, tick_s: f64) -> f64 {
     sequence_v.iter().sum::<f64>() * tick_s / galvo.torque_constant
 }
 
-/// Checks that every jump starts and ends where the optics reach, and ends at rest: no current left,
-/// the mirror with its vibration within the job's tolerance of its target.
+/// Checks that every jump starts and ends where the optics reach, and ends at rest: no current
+/// left, the mirror with its vibration within the job's tolerance of its target.
 pub fn check_jumps(draft: &PlanDraft, gains: &Gains) -> Result<(), AuditError> {
     let scanner = &draft.machine.scanner;
     let galvo = Galvo::new(scanner);
