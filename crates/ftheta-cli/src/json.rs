@@ -36,7 +36,7 @@ pub fn marked(
 ) -> Value {
     let planning_s: f64 = stages
         .iter()
-        .filter(|(name, _)| ["lay", "plan", "audit"].contains(name))
+        .filter(|(name, _)| ["lay", "atlas", "plan", "audit"].contains(name))
         .map(|(_, time_s)| time_s)
         .sum();
     let mut plan = plan(&marked.plan, &marked.times);

@@ -26,6 +26,7 @@ impl Progress {
     pub fn observe(&mut self, stage: Stage) {
         let (name, share) = match stage {
             Stage::Lay => ("lay", 0.0),
+            Stage::Atlas(share) => ("atlas", share),
             Stage::Plan => ("plan", 0.0),
             Stage::Audit => ("audit", 0.0),
             Stage::Play(share) => ("play", share),

@@ -47,8 +47,38 @@ pub fn draft(
     tolerance_mm: f64,
     (atlas, heat_share): (&mut Atlas, f64),
 ) -> Result<PlanDraft, PlanError> {
-    let jumps = Jumps::new(machine, atlas, heat_share)?;
+    let longest_rad = longest_step_rad(&toolpath, machine);
+    atlas.extend(0, longest_rad)?;
+    let n_ticks_max = atlas.jump(longest_rad).map_or(0, |jump| jump.n_ticks);
+    let jumps = Jumps {
+        machine,
+        atlas,
+        galvo: Galvo::new(&machine.scanner),
+        gains: Gains::design(&machine.scanner, machine.output.period_s())?,
+        used: BTreeMap::new(),
+        sequences_v: Vec::new(),
+        heat_a2: [0.0; 2],
+        heat_max_a2: heat_share * machine.scanner.current_rms_a.powi(2),
+        n_ticks_max,
+    };
     builder::draft(toolpath, machine, settings, tolerance_mm, Some(jumps))
+}
+
+/// The longest step that an axis takes from the centre through the marks and back, rad.
+pub fn longest_step_rad(toolpath: &Toolpath, machine: &Machine) -> f64 {
+    let angles = |place: Point| angles_from_field(&machine.optics, place.into());
+    let mut at = angles(Point::ZERO);
+    let mut longest_rad = 0.0_f64;
+    for mark in &toolpath.marks {
+        if let (Some(from), Some(to)) = (at, angles(mark.start())) {
+            let step_rad = (to.x_rad - from.x_rad).abs().max((to.y_rad - from.y_rad).abs());
+            longest_rad = longest_rad.max(step_rad);
+        }
+        at = mark.points.last().and_then(|&end| angles(end));
+    }
+    // And back to the centre.
+    let back_rad = at.map_or(0.0, |end| end.x_rad.abs().max(end.y_rad.abs()));
+    longest_rad.max(back_rad)
 }
 
 /// Chooses sequences of the atlas, and lets the coils cool where they must.
@@ -63,6 +93,9 @@ pub(crate) struct Jumps<'a> {
     /// Filtered squared current of each axis, A².
     heat_a2: [f64; 2],
     heat_max_a2: f64,
+    /// Ticks of the job's longest jump: none is prolonged beyond, which would need programs that no
+    /// other jump does.
+    n_ticks_max: usize,
 }
 
 /// A jump that was chosen.
@@ -88,20 +121,7 @@ struct Used {
     heat_a2: f64,
 }
 
-impl<'a> Jumps<'a> {
-    fn new(machine: &'a Machine, atlas: &'a mut Atlas, heat_share: f64) -> Result<Self, PlanError> {
-        Ok(Self {
-            machine,
-            atlas,
-            galvo: Galvo::new(&machine.scanner),
-            gains: Gains::design(&machine.scanner, machine.output.period_s())?,
-            used: BTreeMap::new(),
-            sequences_v: Vec::new(),
-            heat_a2: [0.0; 2],
-            heat_max_a2: heat_share * machine.scanner.current_rms_a.powi(2),
-        })
-    }
-
+impl Jumps<'_> {
     /// The sequences that the chosen jumps refer to, V.
     pub(crate) fn into_sequences(self) -> Vec<Vec<f64>> {
         self.sequences_v
@@ -158,6 +178,9 @@ impl<'a> Jumps<'a> {
         let speed_max_rad_s = free * scanner.speed_max_rad_s;
         for longer in 0..=N_LONGER_MAX {
             let n_ticks = first + (first as f64 * LONGER * longer as f64).ceil() as usize;
+            if longer > 0 && n_ticks > self.n_ticks_max {
+                break;
+            }
             self.atlas.extend_ticks(level, n_ticks)?;
             let Some(jump) = self.atlas.jump_at(level, distance_rad, n_ticks) else {
                 return Ok(None);

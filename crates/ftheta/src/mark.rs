@@ -109,6 +109,8 @@ pub struct PlanTimes {
 pub enum Stage {
     /// Shapes become vectors in order.
     Lay,
+    /// Jumps are solved that no earlier job has needed; the share of them done, about.
+    Atlas(f64),
     /// Vectors become motion.
     Plan,
     /// Every sample of the plan is checked.

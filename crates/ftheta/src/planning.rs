@@ -59,10 +59,14 @@ impl Planning<'_> {
             current_bound: CurrentBound::Always,
         };
         let mut atlas = options.atlas_store.load(scanner, axis, warnings)?;
+        let n_kept = atlas.n_sequences();
+        let longest_rad = optimal::longest_step_rad(toolpath, machine);
+        while atlas.grow(longest_rad)? {
+            observer(Stage::Atlas((atlas.reach_rad() / longest_rad).sqrt()));
+        }
         let mut refused = None;
         for heat_share in optimal::HEAT_SHARES {
             observer(Stage::Plan);
-            let n_kept = atlas.n_sequences();
             let jumps = (&mut atlas, heat_share);
             let draft = optimal::draft(toolpath.clone(), machine, settings, tolerance_mm, jumps)?;
             if atlas.n_sequences() > n_kept {

@@ -156,6 +156,19 @@ impl Atlas {
         self.extend_while(level, |built| built.reach_rad() < step_rad)
     }
 
+    /// Makes the first level cover a few more ticks if it does not reach this step; returns whether
+    /// it still does not.
+    ///
+    /// # Errors
+    /// As [`Self::extend`].
+    pub fn grow(&mut self, step_rad: f64) -> Result<bool, JumpError> {
+        let is_short = |built: &Level| built.reach_rad() < step_rad;
+        if is_short(&self.levels[0]) {
+            self.grow_while(0, &is_short)?;
+        }
+        Ok(is_short(&self.levels[0]))
+    }
+
     /// Makes a level cover so many ticks; returns whether it had to be extended.
     ///
     /// # Errors
@@ -173,23 +186,32 @@ impl Atlas {
         level: usize,
         is_short: impl Fn(&Level) -> bool,
     ) -> Result<bool, JumpError> {
-        let mut extended = false;
+        let extended = is_short(&self.levels[level]);
         while is_short(&self.levels[level]) {
-            extended = true;
-            let first = self.levels[level].steps_rad.len();
-            if first > N_TICKS_MAX {
-                let (step_rad, tick_us) = (self.reach_rad(), self.options.tick_s * 1e6);
-                return Err(JumpError::TooLong { step_rad, limit: N_TICKS_MAX, tick_us });
-            }
-            for reach in self.batch(level, first) {
-                // What lies beyond the range is dropped, errors with it, so that the batch does
-                // not show in the result.
-                if is_short(&self.levels[level]) {
-                    self.levels[level].push(reach?);
-                }
-            }
+            self.grow_while(level, &is_short)?;
         }
         Ok(extended)
+    }
+
+    /// Solves the next few numbers of ticks and keeps them as long as the level is short.
+    ///
+    /// What lies beyond is dropped, errors with it, so that the batch does not show in the result.
+    fn grow_while(
+        &mut self,
+        level: usize,
+        is_short: &impl Fn(&Level) -> bool,
+    ) -> Result<(), JumpError> {
+        let first = self.levels[level].steps_rad.len();
+        if first > N_TICKS_MAX {
+            let (step_rad, tick_us) = (self.reach_rad(), self.options.tick_s * 1e6);
+            return Err(JumpError::TooLong { step_rad, limit: N_TICKS_MAX, tick_us });
+        }
+        for reach in self.batch(level, first) {
+            if is_short(&self.levels[level]) {
+                self.levels[level].push(reach?);
+            }
+        }
+        Ok(())
     }
 
     /// The jump in the fewest ticks; `None` beyond the range.
