@@ -22,6 +22,9 @@ const DAMPING_RATIOS: [f64; 2] = [0.0025, 0.02];
 const LOOKS: [f64; N_LOOKS] = [0.0, 0.5, 1.0];
 /// Number of looks.
 pub(super) const N_LOOKS: usize = 3;
+/// Parts of a tick after which the mirror's angle is looked at; the next tick begins with one. Between
+/// two looks it bends by a few millionths of the angle limit, between two ticks by sixteen times that.
+const TURNS: [f64; 3] = [0.25, 0.5, 0.75];
 /// Part of the allowed end error that the program may use.
 const ERROR_SHARE: f64 = 0.95;
 
@@ -129,6 +132,8 @@ pub struct Axis {
     inside: Vec<Weights>,
     /// The same where the program bounds it.
     pub(super) bounded: Vec<Weights>,
+    /// Mirror's angle inside the tick and at its end.
+    pub(super) mirror: Vec<Weights>,
 }
 
 impl Axis {
@@ -155,8 +160,14 @@ impl Axis {
             CurrentBound::Always => currents(&galvo, options.tick_s),
             CurrentBound::AtTicks => (Vec::new(), Vec::new()),
         };
+        let mirror = TURNS.into_iter().chain([1.0]).map(|part| {
+            let step = galvo.step(options.tick_s * part);
+            let row = galvo.mirror_row();
+            (step.a.transpose() * row, row.dot(&step.b))
+        });
         Ok(Self {
             step: galvo.step(options.tick_s),
+            mirror: mirror.collect(),
             active,
             rest,
             tick_s: options.tick_s,
@@ -248,6 +259,11 @@ impl Axis {
     /// State after the tick.
     pub(super) fn advance(&self, state: &State, voltage_v: f64) -> State {
         self.step.a * state + self.step.b * voltage_v
+    }
+
+    /// Mirror's angle at several times of the tick, up to its end, rad.
+    pub(super) fn mirror_rad(&self, state: State, voltage_v: f64) -> impl Iterator<Item = f64> {
+        self.mirror.iter().map(move |(weights, gain)| weights.dot(&state) + gain * voltage_v)
     }
 
     /// Greatest current during the tick, A, either sign.

@@ -168,10 +168,36 @@ fn solve(axis: &Axis, end: End, room_rad: f64, n_ticks: usize) -> Result<Option<
         }
     };
     let found = axis.best(&Request { n_ticks, ends, goal: Goal::Farthest, way })?;
-    Ok(found.map(|(speed_rad_s, voltages_v)| {
-        // Where the axis creeps to, less what the speed at the end will still add.
-        let change = (ends.end - ends.start) * speed_rad_s;
-        let distance_rad = axis.creep_rad(&voltages_v) - axis.creep_row().dot(&change);
-        Room { room_rad, speed_rad_s, distance_rad, voltages_v }
-    }))
+    Ok(found
+        .map(|(speed_rad_s, voltages_v)| within(axis, &ends, room_rad, speed_rad_s, voltages_v)))
+}
+
+/// The room with voltages that keep it: those of the program, which may pass its rows by its
+/// tolerance, scaled down by as much.
+fn within(
+    axis: &Axis,
+    ends: &Ends,
+    room_rad: f64,
+    mut speed_rad_s: f64,
+    mut voltages_v: Vec<f64>,
+) -> Room {
+    let mut state = ends.start * speed_rad_s;
+    let (mut least_rad, mut most_rad) = (0.0_f64, 0.0_f64);
+    for &voltage in &voltages_v {
+        for angle in axis.mirror_rad(state, voltage) {
+            (least_rad, most_rad) = (least_rad.min(angle), most_rad.max(angle));
+        }
+        state = axis.advance(&state, voltage);
+    }
+    let end_rad = axis.galvo.mirror_row().dot(&state);
+    let used_rad = if ends.start == State::zeros() { end_rad - least_rad } else { most_rad };
+    if used_rad > room_rad {
+        let factor = room_rad / used_rad;
+        speed_rad_s *= factor;
+        voltages_v.iter_mut().for_each(|voltage| *voltage *= factor);
+    }
+    // Where the axis creeps to, less what the speed at the end will still add.
+    let change = (ends.end - ends.start) * speed_rad_s;
+    let distance_rad = axis.creep_rad(&voltages_v) - axis.creep_row().dot(&change);
+    Room { room_rad, speed_rad_s, distance_rad, voltages_v }
 }
