@@ -19,7 +19,7 @@ static ALLOCATIONS: AllocProfiler = AllocProfiler::system();
 /// Steps in a row; each iteration does all of them.
 const N_STEPS: u32 = 1000;
 /// Longest step, rad: the mean jump then takes 47 samples on S10.
-const STEP_MAX_RAD: f64 = 0.075;
+const STEP_MAX_RAD: f64 = 0.085;
 /// Samples of the loop that only writes.
 const N_SAMPLES: usize = 47;
 

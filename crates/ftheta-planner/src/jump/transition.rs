@@ -22,6 +22,8 @@ const LONGER: f64 = 0.3;
 /// Parts by which the jump between a stop and a start is longer than need be, tried in this order: a
 /// mirror that swings past the ends of the fastest jump may hit the wall, of a slower one it does not.
 const STRETCHES: [f64; 5] = [0.0, 0.1, 0.3, 0.6, 1.0];
+/// Periods of the mode by which a stop or start without room to spare is longer than others.
+const N_SWINGS: f64 = 2.0;
 /// A displacement may exceed the longest step of its ticks by this part, when the ends move.
 const SLACK: f64 = 1.02;
 /// Rounding that an angle, speed or current may carry.
@@ -298,7 +300,8 @@ impl Transitions {
                 Ok(Some((Phase::Sum(brake.sum), side * brake.distance_rad)))
             }
             Fit::Unknown => {
-                let n_ticks = self.ample_ticks(room_rad);
+                let swing_s = N_SWINGS * std::f64::consts::TAU / self.axis.galvo.omega;
+                let n_ticks = self.ample_ticks(room_rad) + (swing_s / self.axis.tick_s) as usize;
                 let solved = brakes.exact(&self.axis, room_rad, speed_rad_s, n_ticks)?;
                 Ok(solved.map(|(mut voltages_v, distance_rad)| {
                     voltages_v.iter_mut().for_each(|voltage| *voltage *= side);
