@@ -218,11 +218,21 @@ impl Axis {
     /// # Errors
     /// If the linear program cannot be solved.
     pub fn reaches(&self, ask: &Ask, n_ticks: usize) -> Result<bool, JumpError> {
+        Ok(self.meet(ask, n_ticks)?.is_some())
+    }
+
+    /// The voltages of a transition in this many ticks, by a program for just that; `None` if there
+    /// are none.
+    pub(super) fn meet(&self, ask: &Ask, n_ticks: usize) -> Result<Option<Vec<f64>>, JumpError> {
         let start = State::new(0.0, ask.from_rad_s, 0.0, 0.0, 0.0);
         let end = State::new(ask.distance_rad, ask.to_rad_s, 0.0, 0.0, 0.0);
         let ends = Ends { start, end, place: true };
         let request = Request { n_ticks, ends, goal: Goal::Farthest, way: Way::Free };
-        Ok(self.best(&request)?.is_some_and(|(factor, _)| factor >= 1.0))
+        let found = self.best(&request)?.filter(|(factor, _)| *factor >= 1.0);
+        Ok(found.map(|(factor, mut voltages_v)| {
+            voltages_v.iter_mut().for_each(|voltage| *voltage /= factor);
+            voltages_v
+        }))
     }
 
     /// The factor on the request's ends and the voltages, exact; `None` if nothing is reached.

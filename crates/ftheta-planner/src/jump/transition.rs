@@ -22,6 +22,8 @@ const LONGER: f64 = 0.3;
 /// Parts by which the jump between a stop and a start is longer than need be, tried in this order: a
 /// mirror that swings past the ends of the fastest jump may hit the wall, of a slower one it does not.
 const STRETCHES: [f64; 5] = [0.0, 0.1, 0.3, 0.6, 1.0];
+/// Most ticks of a way without turning that gets a program of its own.
+const N_TICKS_STRAIGHT: usize = 150;
 /// Periods of the mode by which a stop or start without room to spare is longer than others.
 const N_SWINGS: f64 = 2.0;
 /// A displacement may exceed the longest step of its ticks by this part, when the ends move.
@@ -158,7 +160,40 @@ impl Transitions {
                 return Ok(Some(transition));
             }
         }
-        self.detour(route, 0)
+        match self.detour(route, 0)? {
+            Some(transition) => Ok(Some(transition)),
+            None => self.straight(route),
+        }
+    }
+
+    /// A route without turning that the fans miss, by programs of its own: near a wall, where it can
+    /// neither stop nor be stretched, a single number of ticks may be all there is.
+    fn straight(&self, route: &Route) -> Result<Option<Transition<'_>>, JumpError> {
+        let ask = ask(route);
+        let (v0, v1, step) = (ask.from_rad_s, ask.to_rad_s, ask.distance_rad.abs());
+        if v0 * v1 < 0.0 || ask.distance_rad * (v0 + v1) <= 0.0 {
+            return Ok(None);
+        }
+        let galvo = &self.axis.galvo;
+        let most = galvo.torque_constant / galvo.inertia() * self.axis.current_max_a;
+        // Slowest where full braking meets full acceleration; slower only by turning.
+        let slowest = (0.5 * (v0 * v0 + v1 * v1) - most * step).max(0.0).sqrt();
+        let longest_s = (v0.abs() + v1.abs() - 2.0 * slowest) / most;
+        let n_longest = ((longest_s / self.axis.tick_s) as usize + 1).min(N_TICKS_STRAIGHT);
+        for n_ticks in N_TICKS_MIN..=n_longest {
+            if !self.may_meet(route, n_ticks) {
+                continue;
+            }
+            let Some(voltages_v) = self.axis.meet(&ask, n_ticks)? else {
+                continue;
+            };
+            let phases = [Phase::Own(voltages_v), Phase::Rest(0), Phase::Rest(0)];
+            let transition = Transition { phases };
+            if self.keeps_limits(route, &transition) {
+                return Ok(Some(transition));
+            }
+        }
+        Ok(None)
     }
 
     /// The voltages of two axes that move together, in the same number of ticks; `None` if there is

@@ -12,8 +12,8 @@ use ftheta_planner::jump::Route;
 const RATIO: f64 = 1.06;
 /// Smallest speed of the tables, rad/s.
 const SPEED_MIN_RAD_S: f64 = 1.0;
-/// Greatest, rad/s.
-const SPEED_MAX_RAD_S: f64 = 350.0;
+/// They go beyond the greatest that is asked for by this factor, for chords on both sides.
+const BEYOND: f64 = 1.2;
 /// Part of the border within which an answer is counted apart.
 const BORDER: f64 = 1e-3;
 /// Most ticks of a direct way that are tried.
@@ -50,8 +50,8 @@ pub struct Border {
 }
 
 impl Border {
-    /// Solves the tables.
-    pub fn new(scanner: &Scanner) -> Self {
+    /// Solves the tables up to a speed.
+    pub fn new(scanner: &Scanner, speed_max_rad_s: f64) -> Self {
         let flow = Flow::new(scanner, TICK_S);
         let mut border = Self {
             scanner: scanner.clone(),
@@ -60,7 +60,7 @@ impl Border {
             rooms_rad: Default::default(),
         };
         let mut speed = SPEED_MIN_RAD_S;
-        while speed < SPEED_MAX_RAD_S {
+        while speed < BEYOND * speed_max_rad_s {
             let n_ticks = border.ample_ticks(speed);
             let rooms = [Goal::Turn(speed), Goal::RunUp(speed)]
                 .map(|goal| border.solve(n_ticks, goal).unwrap_or(0.0));

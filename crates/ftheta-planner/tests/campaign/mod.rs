@@ -116,7 +116,7 @@ impl Campaign {
         let voltage_max_v = scanner.voltage_max_v * (1.0 - self.voltage_reserve);
         let usable = Scanner { voltage_max_v, ..scanner.clone() };
         let check = Check { flow: Flow::new(scanner, TICK_S / N_SUBSTEPS as f64), usable: &usable };
-        let border = Border::new(&usable);
+        let border = Border::new(&usable, self.speed_max_rad_s);
         let exact = matches!(self.model, Model::Flexible);
         let one = |index: usize| {
             let route = self.request(scanner, index);
