@@ -22,8 +22,8 @@ const DAMPING_RATIOS: [f64; 2] = [0.0025, 0.02];
 const LOOKS: [f64; N_LOOKS] = [0.0, 0.5, 1.0];
 /// Number of looks.
 pub(super) const N_LOOKS: usize = 3;
-/// Parts of a tick after which the mirror's angle is looked at; the next tick begins with one. Between
-/// two looks it bends by a few millionths of the angle limit, between two ticks by sixteen times that.
+/// Parts of a tick after which the mirror's angle is looked at, besides its end. Between two looks
+/// it bends by a few millionths of the angle limit, between two ticks by sixteen times that.
 const TURNS: [f64; 3] = [0.25, 0.5, 0.75];
 /// Part of the allowed end error that the program may use.
 const ERROR_SHARE: f64 = 0.95;

@@ -13,7 +13,7 @@ const ROOM_MIN_RAD: f64 = 2e-5;
 /// The largest, rad.
 const ROOM_MAX_RAD: f64 = 0.8;
 
-/// By this part a speed may exceed what the rooms say: with more ticks, the mode can be swung up first.
+/// By this part a speed may exceed what the rooms say: with more ticks, the mode can be swung up.
 /// On S25 that is worth up to 0.46 %, on S10 0.1 %, and two of its periods give all of it.
 const LONGER_GAIN: f64 = 0.01;
 

@@ -19,8 +19,8 @@ const N_TICKS_MAX: usize = 512;
 const N_TICKS_EACH: usize = 64;
 /// After the first number of ticks that meets the ends, this part more are tried for the angles.
 const LONGER: f64 = 0.3;
-/// Parts by which the jump between a stop and a start is longer than need be, tried in this order: a
-/// mirror that swings past the ends of the fastest jump may hit the wall, of a slower one it does not.
+/// Parts by which the jump between a stop and a start is longer than need be, tried in this order:
+/// where a mirror swings past the ends of the fastest jump into the wall, a slower one swings less.
 const STRETCHES: [f64; 5] = [0.0, 0.1, 0.3, 0.6, 1.0];
 /// Most ticks of a way without turning that gets a program of its own.
 const N_TICKS_STRAIGHT: usize = 150;
@@ -143,8 +143,9 @@ impl Transitions {
     ///
     /// # Accuracy
     /// Both ends within 1e-9 of the largest state; voltage, current, angle and speed within their
-    /// limits, the mirror by up to 1e-5 of the angle between two looks a quarter of a tick apart. Of 1000 routes that stop or start within 1e-3 of the room that is
-    /// theirs at least, a few are solved by a program of their own.
+    /// limits; between two looks, a quarter of a tick apart, the mirror may pass its limit by 1e-5
+    /// of it. Routes that stop or start with less than a hundredth of speed to spare, and those
+    /// that are refused, take programs of their own: milliseconds, not microseconds.
     pub fn plan(&self, route: &Route) -> Result<Option<Transition<'_>>, JumpError> {
         self.check(route)?;
         let mut n_last = usize::MAX;
@@ -166,8 +167,8 @@ impl Transitions {
         }
     }
 
-    /// A route without turning that the fans miss, by programs of its own: near a wall, where it can
-    /// neither stop nor be stretched, a single number of ticks may be all there is.
+    /// A route without turning that the fans miss, by programs of its own: near a wall, where it
+    /// can neither stop nor be stretched, a single number of ticks may be all there is.
     fn straight(&self, route: &Route) -> Result<Option<Transition<'_>>, JumpError> {
         let ask = ask(route);
         let (v0, v1, step) = (ask.from_rad_s, ask.to_rad_s, ask.distance_rad.abs());
