@@ -12,7 +12,7 @@ cargo xtask COMMAND
   ci       everything that CI runs: format, clippy, tidy, licences, docs, test
   test     all tests, the examples and the main job
   tidy     layers, sizes, descriptions, words
-  figures  the benches, printed as a table";
+  figures  the benches, printed as a table, and a million transitions";
 
 fn main() -> ExitCode {
     let command = std::env::args().nth(1).unwrap_or_default();
@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         "ci" => ci(),
         "test" => test(),
         "tidy" => tidy::check(&root()),
-        "figures" => cargo(&["bench", "--workspace"]),
+        "figures" => figures(),
         _ => Err(HELP.into()),
     };
     match result {
@@ -40,6 +40,11 @@ fn ci() -> Result<(), String> {
     cargo(&["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"])?;
     cargo(&["doc", "--release", "--workspace", "--no-deps", "--document-private-items"])?;
     test()
+}
+
+fn figures() -> Result<(), String> {
+    cargo(&["bench", "--workspace"])?;
+    cargo(&["run", "--release", "--package", "ftheta-planner", "--example", "transitions"])
 }
 
 fn test() -> Result<(), String> {

@@ -22,6 +22,9 @@ const DAMPING_RATIOS: [f64; 2] = [0.0025, 0.02];
 const LOOKS: [f64; N_LOOKS] = [0.0, 0.5, 1.0];
 /// Number of looks.
 pub(super) const N_LOOKS: usize = 3;
+/// Parts of a tick after which the mirror's angle is looked at, besides its end. Between two looks
+/// it bends by a few millionths of the angle limit, between two ticks by sixteen times that.
+const TURNS: [f64; 3] = [0.25, 0.5, 0.75];
 /// Part of the allowed end error that the program may use.
 const ERROR_SHARE: f64 = 0.95;
 
@@ -129,6 +132,8 @@ pub struct Axis {
     inside: Vec<Weights>,
     /// The same where the program bounds it.
     pub(super) bounded: Vec<Weights>,
+    /// Mirror's angle inside the tick and at its end.
+    pub(super) mirror: Vec<Weights>,
 }
 
 impl Axis {
@@ -155,8 +160,14 @@ impl Axis {
             CurrentBound::Always => currents(&galvo, options.tick_s),
             CurrentBound::AtTicks => (Vec::new(), Vec::new()),
         };
+        let mirror = TURNS.into_iter().chain([1.0]).map(|part| {
+            let step = galvo.step(options.tick_s * part);
+            let row = galvo.mirror_row();
+            (step.a.transpose() * row, row.dot(&step.b))
+        });
         Ok(Self {
             step: galvo.step(options.tick_s),
+            mirror: mirror.collect(),
             active,
             rest,
             tick_s: options.tick_s,
@@ -207,11 +218,21 @@ impl Axis {
     /// # Errors
     /// If the linear program cannot be solved.
     pub fn reaches(&self, ask: &Ask, n_ticks: usize) -> Result<bool, JumpError> {
+        Ok(self.meet(ask, n_ticks)?.is_some())
+    }
+
+    /// The voltages of a transition in this many ticks, by a program for just that; `None` if there
+    /// are none.
+    pub(super) fn meet(&self, ask: &Ask, n_ticks: usize) -> Result<Option<Vec<f64>>, JumpError> {
         let start = State::new(0.0, ask.from_rad_s, 0.0, 0.0, 0.0);
         let end = State::new(ask.distance_rad, ask.to_rad_s, 0.0, 0.0, 0.0);
         let ends = Ends { start, end, place: true };
         let request = Request { n_ticks, ends, goal: Goal::Farthest, way: Way::Free };
-        Ok(self.best(&request)?.is_some_and(|(factor, _)| factor >= 1.0))
+        let found = self.best(&request)?.filter(|(factor, _)| *factor >= 1.0);
+        Ok(found.map(|(factor, mut voltages_v)| {
+            voltages_v.iter_mut().for_each(|voltage| *voltage /= factor);
+            voltages_v
+        }))
     }
 
     /// The factor on the request's ends and the voltages, exact; `None` if nothing is reached.
@@ -253,6 +274,11 @@ impl Axis {
     /// State after the tick.
     pub(super) fn advance(&self, state: &State, voltage_v: f64) -> State {
         self.step.a * state + self.step.b * voltage_v
+    }
+
+    /// Mirror's angle at several times of the tick, up to its end, rad.
+    pub(super) fn mirror_rad(&self, state: State, voltage_v: f64) -> impl Iterator<Item = f64> {
+        self.mirror.iter().map(move |(weights, gain)| weights.dot(&state) + gain * voltage_v)
     }
 
     /// Greatest current during the tick, A, either sign.

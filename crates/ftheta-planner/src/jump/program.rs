@@ -416,47 +416,65 @@ impl Program<'_> {
 
     /// Adds where the mirror must be on the way.
     fn way(&mut self) {
-        let Self { axis, request, layout, units, rows, .. } = self;
-        let mirror = axis.galvo.mirror_row();
-        let at = |tick: usize, sign: f64| {
-            let weight = |state: usize| sign * mirror[state] * units.state[state] / units.state[0];
-            let column = |position| layout.state(tick, position);
-            let entry = |(position, &state): (usize, &usize)| (column(position), weight(state));
-            axis.active.iter().enumerate().map(entry).collect::<Vec<_>>()
-        };
-        match request.way {
+        let n_ticks = self.layout.n_ticks;
+        let unit = self.units.state[0];
+        let target = self.request.ends.end[0] * self.units.factor / unit;
+        match self.request.way {
             Way::Free => {}
             Way::Near(tube) => {
-                let epsilon = tube.epsilon_rad / units.state[0];
-                let target = request.ends.end[0] * units.factor / units.state[0];
-                for tick in tube.arrival..=layout.n_ticks {
+                // From the end of the tick before on, the last of its times.
+                for tick in tube.arrival.saturating_sub(1)..n_ticks {
                     for sign in [1.0, -1.0] {
-                        let target = [(layout.factor(), -sign * target)];
-                        rows.add(at(tick, sign).into_iter().chain(target), epsilon);
+                        let target = [(self.layout.factor(), -sign * target)];
+                        if let Some(place) = self.mirror(tick, sign).pop() {
+                            let row = place.into_iter().chain(target);
+                            self.rows.add(row, tube.epsilon_rad / unit);
+                        }
                     }
                 }
             }
             Way::Below(limit_rad) => {
-                for tick in 1..=layout.n_ticks {
-                    rows.add(at(tick, 1.0), limit_rad / units.state[0]);
+                for place in self.mirrors(1.0) {
+                    self.rows.add(place, limit_rad / unit);
                 }
             }
             Way::Within(low_rad, high_rad) => {
-                for tick in 1..=layout.n_ticks {
-                    rows.add(at(tick, 1.0), high_rad / units.state[0]);
-                    rows.add(at(tick, -1.0), -low_rad / units.state[0]);
+                for (sign, limit_rad) in [(1.0, high_rad), (-1.0, -low_rad)] {
+                    for place in self.mirrors(sign) {
+                        self.rows.add(place, limit_rad / unit);
+                    }
                 }
             }
             Way::Behind(limit_rad) => {
-                let end = at(layout.n_ticks, 1.0);
-                rows.add(end.clone(), limit_rad / units.state[0]);
-                for tick in 1..layout.n_ticks {
-                    rows.add(
-                        at(tick, -1.0).into_iter().chain(end.clone()),
-                        limit_rad / units.state[0],
-                    );
+                let end = self.mirror(n_ticks - 1, 1.0).pop().unwrap_or_default();
+                self.rows.add(end.clone(), limit_rad / unit);
+                for place in self.mirrors(-1.0) {
+                    self.rows.add(place.into_iter().chain(end.clone()), limit_rad / unit);
                 }
             }
         }
+    }
+
+    fn mirrors(&self, sign: f64) -> Vec<Vec<(usize, f64)>> {
+        (0..self.layout.n_ticks).flat_map(|tick| self.mirror(tick, sign)).collect()
+    }
+
+    /// The mirror's angle, either sign, at the times of a tick up to its end, in units.
+    fn mirror(&self, tick: usize, sign: f64) -> Vec<Vec<(usize, f64)>> {
+        let Self { axis, request, layout, units, .. } = self;
+        let unit = sign / units.state[0];
+        let at = |(weights, gain): &(State, f64)| {
+            let mut entries = vec![(layout.voltage(tick), gain * units.voltage * unit)];
+            if tick == 0 {
+                let free = weights.dot(&request.ends.start) * units.factor * unit;
+                entries.push((layout.factor(), free));
+            } else {
+                entries.extend(axis.active.iter().enumerate().map(|(position, &state)| {
+                    (layout.state(tick, position), weights[state] * units.state[state] * unit)
+                }));
+            }
+            entries
+        };
+        axis.mirror.iter().map(at).collect()
     }
 }

@@ -19,6 +19,13 @@ const N_TICKS_MAX: usize = 512;
 const N_TICKS_EACH: usize = 64;
 /// After the first number of ticks that meets the ends, this part more are tried for the angles.
 const LONGER: f64 = 0.3;
+/// Parts by which the jump between a stop and a start is longer than need be, tried in this order:
+/// where a mirror swings past the ends of the fastest jump into the wall, a slower one swings less.
+const STRETCHES: [f64; 5] = [0.0, 0.1, 0.3, 0.6, 1.0];
+/// Most ticks of a way without turning that gets a program of its own.
+const N_TICKS_STRAIGHT: usize = 150;
+/// Periods of the mode by which a stop or start without room to spare is longer than others.
+const N_SWINGS: f64 = 2.0;
 /// A displacement may exceed the longest step of its ticks by this part, when the ends move.
 const SLACK: f64 = 1.02;
 /// Rounding that an angle, speed or current may carry.
@@ -136,8 +143,9 @@ impl Transitions {
     ///
     /// # Accuracy
     /// Both ends within 1e-9 of the largest state; voltage, current, angle and speed within their
-    /// limits at every tick. Of 1000 routes that stop or start within 1e-3 of the room that is
-    /// theirs at least, a few are solved by a program of their own.
+    /// limits; between two looks, a quarter of a tick apart, the mirror may pass its limit by 1e-5
+    /// of it. Routes that stop or start with less than a hundredth of speed to spare, and those
+    /// that are refused, take programs of their own: milliseconds, not microseconds.
     pub fn plan(&self, route: &Route) -> Result<Option<Transition<'_>>, JumpError> {
         self.check(route)?;
         let mut n_last = usize::MAX;
@@ -153,10 +161,40 @@ impl Transitions {
                 return Ok(Some(transition));
             }
         }
-        let Some(transition) = self.stop_and_start(route, 0)? else {
+        match self.detour(route, 0)? {
+            Some(transition) => Ok(Some(transition)),
+            None => self.straight(route),
+        }
+    }
+
+    /// A route without turning that the fans miss, by programs of its own: near a wall, where it
+    /// can neither stop nor be stretched, a single number of ticks may be all there is.
+    fn straight(&self, route: &Route) -> Result<Option<Transition<'_>>, JumpError> {
+        let ask = ask(route);
+        let (v0, v1, step) = (ask.from_rad_s, ask.to_rad_s, ask.distance_rad.abs());
+        if v0 * v1 < 0.0 || ask.distance_rad * (v0 + v1) <= 0.0 {
             return Ok(None);
-        };
-        Ok(self.keeps_limits(route, &transition).then_some(transition))
+        }
+        let galvo = &self.axis.galvo;
+        let most = galvo.torque_constant / galvo.inertia() * self.axis.current_max_a;
+        // Slowest where full braking meets full acceleration; slower only by turning.
+        let slowest = (0.5 * (v0 * v0 + v1 * v1) - most * step).max(0.0).sqrt();
+        let longest_s = (v0.abs() + v1.abs() - 2.0 * slowest) / most;
+        let n_longest = ((longest_s / self.axis.tick_s) as usize + 1).min(N_TICKS_STRAIGHT);
+        for n_ticks in N_TICKS_MIN..=n_longest {
+            if !self.may_meet(route, n_ticks) {
+                continue;
+            }
+            let Some(voltages_v) = self.axis.meet(&ask, n_ticks)? else {
+                continue;
+            };
+            let phases = [Phase::Own(voltages_v), Phase::Rest(0), Phase::Rest(0)];
+            let transition = Transition { phases };
+            if self.keeps_limits(route, &transition) {
+                return Ok(Some(transition));
+            }
+        }
+        Ok(None)
     }
 
     /// The voltages of two axes that move together, in the same number of ticks; `None` if there is
@@ -175,17 +213,14 @@ impl Transitions {
             }
         }
         let [first, second] = routes;
-        let Some(one) = self.stop_and_start(first, 0)? else {
+        let Some(one) = self.detour(first, 0)? else {
             return Ok(None);
         };
-        let Some(other) = self.stop_and_start(second, one.n_ticks())? else {
+        let Some(other) = self.detour(second, one.n_ticks())? else {
             return Ok(None);
         };
-        let Some(one) = self.stop_and_start(first, other.n_ticks())? else {
-            return Ok(None);
-        };
-        let keep = self.keeps_limits(first, &one) && self.keeps_limits(second, &other);
-        Ok(keep.then_some([one, other]))
+        // What was in time before waits; then both take the same time.
+        Ok(self.detour(first, other.n_ticks())?.map(|one| [one, other]))
     }
 
     /// Numbers of ticks that meet the ends, with their voltages.
@@ -221,20 +256,42 @@ impl Transitions {
         if route.from_rad_s != 0.0 || route.to_rad_s != 0.0 {
             return None;
         }
-        let transition = Transition::single(self.jump(route.to_rad - route.from_rad)?);
+        let transition = Transition::single(self.jump(route.to_rad - route.from_rad, 0.0)?);
         self.keeps_limits(route, &transition).then_some(transition)
     }
 
-    fn jump(&self, step_rad: f64) -> Option<Sum<'_>> {
-        let jump = self.atlas.jump(step_rad)?;
+    /// A jump in this part more than the fewest ticks, as far as the atlas goes.
+    fn jump(&self, step_rad: f64, stretch: f64) -> Option<Sum<'_>> {
+        let fewest = self.atlas.jump(step_rad)?;
+        let n_ticks = (fewest.n_ticks as f64 * (1.0 + stretch)) as usize;
+        let n_ticks = n_ticks.min(self.atlas.steps_rad().len() - 1);
+        let jump = self.atlas.jump_at(0, step_rad, n_ticks)?;
         let terms = [Term::new(jump.sequence, jump.scale), Term::default()];
         Some(Sum { n_ticks: jump.n_ticks, terms, coast_v: 0.0 })
     }
 
-    /// Stops, jumps, and starts again, in at least so many ticks.
+    /// Stops, jumps, and starts again, in at least so many ticks; `None` if there is not the room.
+    fn detour(
+        &self,
+        route: &Route,
+        n_ticks_min: usize,
+    ) -> Result<Option<Transition<'_>>, JumpError> {
+        for stretch in STRETCHES {
+            let Some(transition) = self.stop_and_start(route, stretch, n_ticks_min)? else {
+                return Ok(None);
+            };
+            if self.keeps_limits(route, &transition) {
+                return Ok(Some(transition));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Stops, jumps in this part more than the fewest ticks, and starts again, in at least so many.
     fn stop_and_start(
         &self,
         route: &Route,
+        stretch: f64,
         n_ticks_min: usize,
     ) -> Result<Option<Transition<'_>>, JumpError> {
         let brakes = self.brakes.get_or_init(|| self.solve_brakes());
@@ -253,7 +310,7 @@ impl Transitions {
             return Ok(None);
         };
         let step_rad = route.to_rad - started_rad - (route.from_rad + stopped_rad);
-        let Some(mut jump) = self.jump(step_rad) else {
+        let Some(mut jump) = self.jump(step_rad, stretch) else {
             return Ok(None);
         };
         let n_ticks = stop.n_ticks() + jump.n_ticks + start.n_ticks();
@@ -279,7 +336,8 @@ impl Transitions {
                 Ok(Some((Phase::Sum(brake.sum), side * brake.distance_rad)))
             }
             Fit::Unknown => {
-                let n_ticks = self.ample_ticks(room_rad);
+                let swing_s = N_SWINGS * std::f64::consts::TAU / self.axis.galvo.omega;
+                let n_ticks = self.ample_ticks(room_rad) + (swing_s / self.axis.tick_s) as usize;
                 let solved = brakes.exact(&self.axis, room_rad, speed_rad_s, n_ticks)?;
                 Ok(solved.map(|(mut voltages_v, distance_rad)| {
                     voltages_v.iter_mut().for_each(|voltage| *voltage *= side);
@@ -323,16 +381,19 @@ impl Transitions {
 
     /// Plays the voltages on the nominal axis.
     fn keeps_limits(&self, route: &Route, transition: &Transition<'_>) -> bool {
-        let (angle_row, speed_row) =
-            (self.axis.galvo.mirror_row(), self.axis.galvo.mirror_speed_row());
+        let speed_row = self.axis.galvo.mirror_speed_row();
+        let angle_max_rad = self.angle_max_rad * (1.0 + ROUNDING);
         let inside = 1.0 + ROUNDING;
         let mut state = State::new(route.from_rad, route.from_rad_s, 0.0, 0.0, 0.0);
-        let mut within = state[0].abs().max(route.to_rad.abs()) <= self.angle_max_rad * inside;
+        let mut within = state[0].abs().max(route.to_rad.abs()) <= angle_max_rad;
         for phase in &transition.phases {
             for tick in 0..phase.n_ticks() {
-                state = self.axis.advance(&state, phase.voltage_v(tick));
-                within &= angle_row.dot(&state).abs() <= self.angle_max_rad * inside
-                    && speed_row.dot(&state).abs() <= self.speed_max_rad_s * inside
+                let voltage = phase.voltage_v(tick);
+                // A turn between two ticks would be seen at neither of them.
+                let mut angles = self.axis.mirror_rad(state, voltage);
+                within &= angles.all(|angle| angle.abs() <= angle_max_rad);
+                state = self.axis.advance(&state, voltage);
+                within &= speed_row.dot(&state).abs() <= self.speed_max_rad_s * inside
                     && state[CURRENT].abs() <= self.axis.current_max_a * inside;
             }
         }
