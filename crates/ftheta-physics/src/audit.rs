@@ -22,7 +22,9 @@ use walk::{Command, Walk};
 /// 97.3 % of the angle.
 pub const CORRECTION_RESERVE: f64 = 0.027;
 
-/// What heat is called in messages.
+/// What is called so in messages.
+const DRIVER_VOLTAGE: &str = "driver voltage";
+const COIL_CURRENT: &str = "coil current";
 const COIL_HEAT: &str = "coil heat";
 
 /// Rounding that a ratio of 1 may carry.
@@ -111,9 +113,10 @@ pub enum AuditError {
 }
 
 impl AuditError {
-    /// Whether the coils are too hot, which gentler or rarer motion mends.
-    pub fn is_heat(&self) -> bool {
-        matches!(self, Self::Limit { quantity, .. } if *quantity == COIL_HEAT)
+    /// Whether driver or coils are asked too much, which gentler or rarer motion mends.
+    pub fn is_strain(&self) -> bool {
+        let strains = [DRIVER_VOLTAGE, COIL_CURRENT, COIL_HEAT];
+        matches!(self, Self::Limit { quantity, .. } if strains.contains(quantity))
     }
 
     /// Place, value and limit for a machine-readable message.
@@ -253,8 +256,8 @@ fn refuse(
         (commanded, free, "commanded angle", scanner.angle_max_rad.to_degrees(), "deg"),
         (now.angle, 1.0, "mirror angle", scanner.angle_max_rad.to_degrees(), "deg"),
         (now.speed, free, "mirror speed", scanner.speed_max_rad_s, "rad/s"),
-        (now.voltage, 1.0, "driver voltage", scanner.voltage_max_v, "V"),
-        (now.current, 1.0, "coil current", scanner.current_max_a, "A"),
+        (now.voltage, 1.0, DRIVER_VOLTAGE, scanner.voltage_max_v, "V"),
+        (now.current, 1.0, COIL_CURRENT, scanner.current_max_a, "A"),
         (now.heat, 1.0, COIL_HEAT, scanner.current_rms_a * scanner.current_rms_a, "A²"),
     ];
     for (ratio, share, quantity, limit, unit) in rows {

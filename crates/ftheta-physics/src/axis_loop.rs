@@ -97,6 +97,10 @@ impl AxisLoop {
         let voltage_v = voltage_v.clamp(-self.voltage_max_v, self.voltage_max_v);
         let free = self.current_row.dot(&self.state);
         let per_volt = self.step.b[CURRENT];
+        if per_volt.is_nan() || per_volt <= 0.0 {
+            // The motor runs up within the tick, so that more voltage ends with no more current.
+            return voltage_v;
+        }
         let (low, high) =
             ((-self.current_max_a - free) / per_volt, (self.current_max_a - free) / per_volt);
         voltage_v.clamp(low, high).clamp(-self.voltage_max_v, self.voltage_max_v)

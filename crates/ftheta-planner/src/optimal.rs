@@ -15,9 +15,25 @@ use ftheta_physics::servo::Gains;
 use kurbo::Point;
 use std::collections::BTreeMap;
 
-/// Parts of the coil's steady heat that jumps may use, in the order to be tried: how much the marks
-/// between them need is seen when the plan is audited.
-pub const HEAT_SHARES: [f64; 4] = [0.95, 0.85, 0.7, 0.5];
+/// How much of the machine jumps may use, since the servo's answer to what the marks have left adds
+/// to them, and the marks themselves need some heat: how much is seen when the plan is audited.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Restraint {
+    /// Part of the coil's steady heat that jumps may use.
+    pub heat_share: f64,
+    /// Part of the current that they leave.
+    pub current_reserve: f64,
+    /// Part of the voltage that they leave, of what the user's reserve has left.
+    pub voltage_reserve: f64,
+}
+
+/// In the order to be tried.
+pub const RESTRAINTS: [Restraint; 4] = [
+    Restraint { heat_share: 0.95, current_reserve: 0.02, voltage_reserve: 0.0 },
+    Restraint { heat_share: 0.8, current_reserve: 0.08, voltage_reserve: 0.08 },
+    Restraint { heat_share: 0.6, current_reserve: 0.2, voltage_reserve: 0.2 },
+    Restraint { heat_share: 0.4, current_reserve: 0.4, voltage_reserve: 0.4 },
+];
 /// Near the edge of the angles a jump is prolonged by this part at a time, so that its commands,
 /// which lead the mirror, stay within them.
 const LONGER: f64 = 1.0 / 12.0;
@@ -36,7 +52,7 @@ pub fn obstacle(machine: &Machine) -> Option<&'static str> {
 /// The content of a plan with jumps from the atlas, before the audit.
 ///
 /// * `atlas`: for this machine's scanner and period; extended as far as the jumps need
-/// * `heat_share`: one of [`HEAT_SHARES`]
+/// * `heat_share`: that of a [`Restraint`]
 ///
 /// # Errors
 /// As [`crate::classic::draft`], and if the atlas cannot be extended.
@@ -186,9 +202,10 @@ impl Jumps<'_> {
                 return Ok(None);
             };
             let reach_rad = distance_rad / jump.scale;
-            let used = used(&mut self.used, (level, n_ticks), || {
-                measure(&jump, self.machine, &self.galvo, &self.gains)
-            });
+            let used = self
+                .used
+                .entry((level, n_ticks))
+                .or_insert_with(|| measure(&jump, self.machine, &self.galvo, &self.gains));
             let within = (0..2).all(|axis| {
                 let factor = steps_rad[axis] / reach_rad;
                 let (low, high) = used.commands_rad;
@@ -230,9 +247,10 @@ impl Jumps<'_> {
             .atlas
             .jump_at(level, distance_rad, n_ticks)
             .expect("the jump was found when its ticks were counted");
-        let used = used(&mut self.used, (level, n_ticks), || {
-            measure(&jump, self.machine, &self.galvo, &self.gains)
-        });
+        let used = self
+            .used
+            .entry((level, n_ticks))
+            .or_insert_with(|| measure(&jump, self.machine, &self.galvo, &self.gains));
         let sequence = *used.sequence.get_or_insert_with(|| {
             self.sequences_v.push(jump.sequence.to_vec());
             (self.sequences_v.len() - 1) as u32
@@ -248,15 +266,6 @@ impl Jumps<'_> {
     fn period_s(&self) -> f64 {
         self.machine.output.period_s()
     }
-}
-
-/// What a sequence does, measured once.
-fn used(
-    all: &mut BTreeMap<(usize, usize), Used>,
-    key: (usize, usize),
-    measure: impl FnOnce() -> Used,
-) -> &mut Used {
-    all.entry(key).or_insert_with(measure)
 }
 
 /// Plays a sequence on the nominal axis.

@@ -60,8 +60,8 @@ impl AtlasStore {
     /// or none, whoever writes at the same time; of two writers the last one stays.
     ///
     /// A folder that cannot be written to costs time in the next run, nothing else: a warning.
-    pub fn save(&self, scanner: &Scanner, atlas: &Atlas, warnings: &mut Vec<Warning>) {
-        let axis = atlas.axis_options();
+    pub fn save(&self, atlas: &Atlas, warnings: &mut Vec<Warning>) {
+        let (scanner, axis) = (atlas.scanner(), atlas.axis_options());
         let (Some(folder), Some(path)) = (&self.folder, self.path(scanner, axis)) else {
             return;
         };
@@ -75,8 +75,12 @@ impl AtlasStore {
             .collect();
         let bytes = atlas_file::write(key(scanner, axis), &levels);
         if let Err(error) = publish(folder, &path, &bytes) {
-            let message = format!("{}: cannot be kept: {error}", path.display());
-            warnings.push(Warning::new("atlas", message));
+            let warning =
+                Warning::new("atlas", format!("{}: cannot be kept: {error}", path.display()));
+            // Tried again and again in a long build, told once.
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
         }
     }
 

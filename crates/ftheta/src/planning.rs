@@ -9,11 +9,18 @@ use ftheta_model::warning::Warning;
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
 use ftheta_planner::classic::{self, Settings};
-use ftheta_planner::jump::{AxisOptions, CurrentBound, Model};
-use ftheta_planner::optimal;
+use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model};
+use ftheta_planner::optimal::{self, Restraint};
 
 /// Part of the tolerance that may be left of a jump when a mark begins (`design/control.md`).
 const JUMP_SHARE: f64 = 1.0 / 3.0;
+
+/// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
+const EPSILON_MIN_RAD: f64 = 2e-8;
+/// Nor more than this, which is no longer arrival, rad.
+const EPSILON_MAX_RAD: f64 = 1e-3;
+/// New sequences after which an atlas is kept although it is not complete.
+const N_BETWEEN_SAVES: usize = 40;
 
 /// What a toolpath is planned with.
 pub(crate) struct Planning<'a> {
@@ -30,7 +37,7 @@ impl Planning<'_> {
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
-        let Self { machine, settings, options } = *self;
+        let Self { machine, options, .. } = *self;
         let obstacle = optimal::obstacle(machine);
         if let (Some(Planner::Optimal), Some(why)) = (options.planner, obstacle) {
             return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
@@ -38,11 +45,10 @@ impl Planning<'_> {
         if options.planner != Some(Planner::Classic) && obstacle.is_none() {
             return self.plan_optimal(&toolpath, warnings, observer);
         }
-        let draft = classic::draft(toolpath, machine, settings, options.tolerance_mm)?;
-        observer(Stage::Audit);
-        Ok(Plan::new(draft)?)
+        self.plan_classic(toolpath, observer)
     }
 
+    /// Plans with ever more restraint, until the audit finds that driver and coils stand it.
     fn plan_optimal(
         &self,
         toolpath: &Toolpath,
@@ -50,35 +56,79 @@ impl Planning<'_> {
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
         let Self { machine, settings, options } = *self;
-        let (scanner, tolerance_mm) = (&machine.scanner, options.tolerance_mm);
-        let epsilon_rad = JUMP_SHARE * tolerance_mm / scale_mm_per_rad(&machine.optics);
-        let axis = AxisOptions {
-            model: Model::Robust { epsilon_rad },
-            tick_s: machine.output.period_s(),
-            voltage_reserve: options.reserve,
-            current_bound: CurrentBound::Always,
-        };
-        let mut atlas = options.atlas_store.load(scanner, axis, warnings)?;
-        let n_kept = atlas.n_sequences();
-        let longest_rad = optimal::longest_step_rad(toolpath, machine);
-        while atlas.grow(longest_rad)? {
-            observer(Stage::Atlas((atlas.reach_rad() / longest_rad).sqrt()));
-        }
+        let tolerance_mm = options.tolerance_mm;
         let mut refused = None;
-        for heat_share in optimal::HEAT_SHARES {
+        for restraint in optimal::RESTRAINTS {
+            let mut atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
             observer(Stage::Plan);
-            let jumps = (&mut atlas, heat_share);
+            let n_kept = atlas.n_sequences();
+            let jumps = (&mut atlas, restraint.heat_share);
             let draft = optimal::draft(toolpath.clone(), machine, settings, tolerance_mm, jumps)?;
             if atlas.n_sequences() > n_kept {
-                options.atlas_store.save(scanner, &atlas, warnings);
+                options.atlas_store.save(&atlas, warnings);
             }
             observer(Stage::Audit);
             match Plan::new(draft) {
                 Ok(plan) => return Ok(plan),
-                Err(error) if error.is_heat() => refused = Some(error),
+                Err(error) if error.is_strain() => refused = Some(error),
                 Err(error) => return Err(error.into()),
             }
         }
-        Err(refused.expect("there is a share, and it was refused").into())
+        let error = refused.expect("there is a restraint, and it was refused");
+        if options.planner == Some(Planner::Optimal) {
+            return Err(error.into());
+        }
+        let message = format!("jumps are planned as classic, since at the limit {error}");
+        warnings.push(Warning::new("plan", message));
+        self.plan_classic(toolpath.clone(), observer)
+    }
+
+    /// The atlas for a toolpath, as far as its longest jump.
+    fn atlas(
+        &self,
+        toolpath: &Toolpath,
+        restraint: &Restraint,
+        warnings: &mut Vec<Warning>,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<Atlas, Error> {
+        let Self { machine, options, .. } = *self;
+        let epsilon_rad = JUMP_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
+        let axis = AxisOptions {
+            model: Model::Robust {
+                epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD),
+            },
+            tick_s: machine.output.period_s(),
+            voltage_reserve: 1.0 - (1.0 - options.reserve) * (1.0 - restraint.voltage_reserve),
+            current_bound: CurrentBound::Always,
+        };
+        let mut scanner = machine.scanner.clone();
+        scanner.current_max_a *= 1.0 - restraint.current_reserve;
+        let mut atlas = options.atlas_store.load(&scanner, axis, warnings)?;
+        let longest_rad = optimal::longest_step_rad(toolpath, machine);
+        let mut n_kept = atlas.n_sequences();
+        while atlas.grow(longest_rad)? {
+            observer(Stage::Atlas((atlas.reach_rad() / longest_rad).sqrt()));
+            // Now and then, so that little is lost when the build is interrupted.
+            if atlas.n_sequences() >= n_kept + N_BETWEEN_SAVES {
+                options.atlas_store.save(&atlas, warnings);
+                n_kept = atlas.n_sequences();
+            }
+        }
+        if atlas.n_sequences() > n_kept {
+            options.atlas_store.save(&atlas, warnings);
+        }
+        Ok(atlas)
+    }
+
+    fn plan_classic(
+        &self,
+        toolpath: Toolpath,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<Plan, Error> {
+        let tolerance_mm = self.options.tolerance_mm;
+        observer(Stage::Plan);
+        let draft = classic::draft(toolpath, self.machine, self.settings, tolerance_mm)?;
+        observer(Stage::Audit);
+        Ok(Plan::new(draft)?)
     }
 }

@@ -8,7 +8,7 @@ use ftheta_model::plan::{Motion, PlanDraft};
 use ftheta_model::space::MirrorAngles;
 
 /// Current that may be left at the end, of the greatest.
-const CURRENT_LEFT: f64 = 1e-6;
+const CURRENT_LEFT: f64 = 5e-5;
 
 /// Yields the commanded angles of one jump: what makes the nominal servo apply the voltages.
 pub struct JumpWalk<'a> {

@@ -12,11 +12,14 @@ use std::thread;
 const N_BATCH: usize = 8;
 /// Greatest number of ticks.
 const N_TICKS_MAX: usize = 20_000;
+/// Above this many ticks only some numbers are solved, at most 1 % apart, and the voltage is held
+/// for as many ticks as leave no more than these to the program.
+const N_SEGMENTS: usize = 300;
 /// Part of the longest step of a number of ticks that each level covers. Time grows like the root
 /// of the step: 5 and 20 % more of it leave 0.8 and 0.5 of the heat (`design/control.md` B).
 const LEVELS: [f64; N_LEVELS] = [1.0, 0.9, 0.69];
 /// Raised when other voltages come out for the same parameters.
-pub const ATLAS_VERSION: u32 = 1;
+pub const ATLAS_VERSION: u32 = 2;
 /// Number of levels.
 pub const N_LEVELS: usize = 3;
 
@@ -32,6 +35,7 @@ pub struct AtlasOptions {
 /// For every number of ticks the longest step and its voltages.
 #[derive(Clone, Debug)]
 pub struct Atlas {
+    scanner: Scanner,
     options: AxisOptions,
     axis: Axis,
     levels: [Level; N_LEVELS],
@@ -137,14 +141,14 @@ impl Atlas {
     ) -> Result<Self, JumpError> {
         let axis = Axis::new(scanner, options)?;
         let whole = |level: Level| if level.is_whole() { level } else { Level::default() };
-        Ok(Self { options, axis, levels: levels.map(whole) })
+        Ok(Self { scanner: scanner.clone(), options, axis, levels: levels.map(whole) })
     }
 
-    /// Makes a level cover steps up to this one; returns whether it had to be extended.
+    /// Makes a level cover steps up to this one.
     ///
     /// # Errors
     /// If the step is out of range or a program fails; what was solved before stays.
-    pub fn extend(&mut self, level: usize, step_rad: f64) -> Result<bool, JumpError> {
+    pub fn extend(&mut self, level: usize, step_rad: f64) -> Result<(), JumpError> {
         let (low, high) = (0.0, 4.0);
         if !(low..=high).contains(&step_rad) {
             let quantity = "step range rad";
@@ -169,11 +173,11 @@ impl Atlas {
         Ok(is_short(&self.levels[0]))
     }
 
-    /// Makes a level cover so many ticks; returns whether it had to be extended.
+    /// Makes a level cover so many ticks.
     ///
     /// # Errors
     /// As [`Self::extend`].
-    pub fn extend_ticks(&mut self, level: usize, n_ticks: usize) -> Result<bool, JumpError> {
+    pub fn extend_ticks(&mut self, level: usize, n_ticks: usize) -> Result<(), JumpError> {
         let short = |built: &Level| built.steps_rad.len() <= n_ticks;
         if level > 0 {
             self.extend_while(0, short)?;
@@ -185,12 +189,11 @@ impl Atlas {
         &mut self,
         level: usize,
         is_short: impl Fn(&Level) -> bool,
-    ) -> Result<bool, JumpError> {
-        let extended = is_short(&self.levels[level]);
+    ) -> Result<(), JumpError> {
         while is_short(&self.levels[level]) {
             self.grow_while(level, &is_short)?;
         }
-        Ok(extended)
+        Ok(())
     }
 
     /// Solves the next few numbers of ticks and keeps them as long as the level is short.
@@ -206,9 +209,16 @@ impl Atlas {
             let (step_rad, tick_us) = (self.reach_rad(), self.options.tick_s * 1e6);
             return Err(JumpError::TooLong { step_rad, limit: N_TICKS_MAX, tick_us });
         }
-        for reach in self.batch(level, first) {
+        let batch = self.batch(level, first);
+        // A few numbers that the solver fails at are passed over; where it fails at all, it ends.
+        let all_fail = batch.iter().all(Result::is_err);
+        for reach in batch {
             if is_short(&self.levels[level]) {
-                self.levels[level].push(reach?);
+                let reach = match reach {
+                    Err(JumpError::Unsolved { .. }) if !all_fail => None,
+                    reach => reach?,
+                };
+                self.levels[level].push(reach);
             }
         }
         Ok(())
@@ -247,6 +257,11 @@ impl Atlas {
     /// Voltages of the longest step of each number of ticks, V; the index is the number.
     pub fn sequences_v(&self) -> &[Vec<f64>] {
         &self.levels[0].sequences_v
+    }
+
+    /// The scanner that the atlas is for.
+    pub fn scanner(&self) -> &Scanner {
+        &self.scanner
     }
 
     /// What the atlas was built for.
@@ -291,14 +306,40 @@ impl Atlas {
     }
 
     fn solve(&self, level: usize, n_ticks: usize) -> Result<Option<Reach>, JumpError> {
-        if level == 0 {
-            return self.axis.longest(n_ticks);
+        if n_ticks <= N_SEGMENTS {
+            return self.solve_on(&self.axis, level, n_ticks, n_ticks);
         }
-        let steps_rad = self.steps_rad();
-        let longest_rad = steps_rad.get(n_ticks).copied().unwrap_or(self.reach_rad());
+        if !n_ticks.is_multiple_of(n_ticks / 100) {
+            // As the number before, with one more tick at rest.
+            return Ok(None);
+        }
+        let n_held = n_ticks.div_ceil(N_SEGMENTS);
+        let tick_s = self.options.tick_s * n_held as f64;
+        let axis = Axis::new(&self.scanner, AxisOptions { tick_s, ..self.options })?;
+        let reach = self.solve_on(&axis, level, n_ticks / n_held, n_ticks)?;
+        Ok(reach.map(|Reach { step_rad, voltages_v }| {
+            let held = voltages_v.into_iter().flat_map(|v| std::iter::repeat_n(v, n_held));
+            let mut voltages_v: Vec<f64> = held.collect();
+            voltages_v.resize(n_ticks, 0.0);
+            Reach { step_rad, voltages_v }
+        }))
+    }
+
+    /// Solves on an axis of perhaps longer ticks what covers so many of the atlas's.
+    fn solve_on(
+        &self,
+        axis: &Axis,
+        level: usize,
+        n_segments: usize,
+        n_ticks: usize,
+    ) -> Result<Option<Reach>, JumpError> {
+        if level == 0 {
+            return axis.longest(n_segments);
+        }
+        let longest_rad = self.steps_rad().get(n_ticks).copied().unwrap_or(self.reach_rad());
         if longest_rad == 0.0 {
             return Ok(None);
         }
-        self.axis.coolest(n_ticks, LEVELS[level] * longest_rad)
+        axis.coolest(n_segments, LEVELS[level] * longest_rad)
     }
 }

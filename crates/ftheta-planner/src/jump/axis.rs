@@ -15,7 +15,8 @@ const BOUNDED: [f64; 3] = [0.2, 0.5, 0.8];
 const BOUNDED_OFTEN: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// Frequencies of the torsional mode that a robust jump stands.
 const N_FREQUENCIES: usize = 7;
-/// Damping ratios that a robust jump stands: nobody measures them, so both ends of what is seen.
+/// Damping ratios that a robust jump stands, and what is between: nobody measures them, so both
+/// ends of what is seen; the machine's own if it lies beyond.
 const DAMPING_RATIOS: [f64; 2] = [0.0025, 0.02];
 /// When one looks at what is left of the motion, in units of the time that a left current needs to
 /// drive the rigid part farthest away.
@@ -342,8 +343,10 @@ fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
         });
         Plant { step: plant.step(tick_s), looks }
     };
+    let [low, high] = DAMPING_RATIOS;
+    let ratios = [low.min(nominal.damping_ratio), high.max(nominal.damping_ratio)];
     (0..N_FREQUENCIES)
-        .flat_map(|index| DAMPING_RATIOS.map(|damping_ratio| plant(index, damping_ratio)))
+        .flat_map(|index| ratios.map(|damping_ratio| plant(index, damping_ratio)))
         .collect()
 }
 

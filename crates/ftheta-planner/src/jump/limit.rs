@@ -12,6 +12,8 @@ const TAIL_PERIODS: f64 = 1.0;
 const N_TAIL_MAX: f64 = 1500.0;
 /// The logarithm of the reached distance is matched to this.
 const MATCH: f64 = 1e-5;
+/// What is good enough where rounding leaves no better.
+const MATCH_LEAST: f64 = 1e-3;
 /// Secant steps; a handful is usual.
 const N_TRIES: usize = 40;
 /// Greatest number of ticks that are tried.
@@ -101,6 +103,9 @@ fn invert(
             power = slope.clamp(0.2, 8.0);
         }
         (time, error) = (next, next_error);
+    }
+    if error.abs() < MATCH_LEAST {
+        return Ok(time.exp());
     }
     Err(JumpError::Unsolved {
         n_ticks: N_SEGMENTS,
