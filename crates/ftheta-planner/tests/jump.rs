@@ -1,19 +1,22 @@
 //! Jumps against reference limits, an independent propagator and plants off the nominal.
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
-use ftheta_model::machine::{Losses, Scanner, Sensor, Servo};
+#[path = "campaign/plant.rs"]
+mod plant;
+
+use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
 use ftheta_planner::jump::{
     Atlas, AtlasOptions, Axis, AxisOptions, CurrentBound, Jump, JumpError, Model, fewest_ticks,
     limit_s, settle_limit_s,
 };
+use plant::{TICK_S, scanner};
 use proptest::prelude::*;
 use serde_json::Value;
 use std::sync::OnceLock;
 
 const SETS: [&str; 3] = ["S10", "S14", "S25"];
 const STEPS_DEG: [&str; 6] = ["0.01", "0.1", "1", "5", "10", "20"];
-const TICK_S: f64 = 1e-5;
 
 fn reference() -> &'static Value {
     static REFERENCE: OnceLock<Value> = OnceLock::new();
@@ -26,30 +29,6 @@ fn epsilon_rad() -> f64 {
 
 fn step_rad(step_deg: &str) -> f64 {
     step_deg.parse::<f64>().unwrap().to_radians()
-}
-
-fn scanner(set: &str) -> Scanner {
-    let number = |key: &str| reference()["sets"][set][key].as_f64().unwrap();
-    Scanner {
-        rotor_inertia_kg_m2: number("Jr"),
-        mirror_inertia_kg_m2: number("Jm"),
-        torque_constant_n_m_a: number("Kt"),
-        resistance_ohm: number("R"),
-        inductance_h: number("L"),
-        torsional_mode_hz: number("f1"),
-        damping_ratio: number("zeta"),
-        voltage_max_v: number("Umax"),
-        current_max_a: number("Imax"),
-        current_rms_a: number("Irms"),
-        thermal_time_s: 1.0,
-        angle_max_rad: 12.5_f64.to_radians(),
-        speed_max_rad_s: 1000.0,
-        f1_uncertainty: 0.03,
-        kt_uncertainty: 0.005,
-        losses: Losses::default(),
-        servo: Servo::StateFeedback { velocity_weight_s: 1e-4, lag_s: 1.64e-4 },
-        sensor: Sensor::default(),
-    }
 }
 
 fn options(model: Model, current_bound: CurrentBound) -> AxisOptions {

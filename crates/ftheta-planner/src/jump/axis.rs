@@ -219,16 +219,21 @@ impl Axis {
     /// # Errors
     /// If the linear program cannot be solved.
     pub fn reaches(&self, ask: &Ask, n_ticks: usize) -> Result<bool, JumpError> {
-        Ok(self.meet(ask, n_ticks)?.is_some())
+        Ok(self.meet(ask, Way::Free, n_ticks)?.is_some())
     }
 
     /// The voltages of a transition in this many ticks, by a program for just that; `None` if there
     /// are none.
-    pub(super) fn meet(&self, ask: &Ask, n_ticks: usize) -> Result<Option<Vec<f64>>, JumpError> {
+    pub(super) fn meet(
+        &self,
+        ask: &Ask,
+        way: Way,
+        n_ticks: usize,
+    ) -> Result<Option<Vec<f64>>, JumpError> {
         let start = State::new(0.0, ask.from_rad_s, 0.0, 0.0, 0.0);
         let end = State::new(ask.distance_rad, ask.to_rad_s, 0.0, 0.0, 0.0);
         let ends = Ends { start, end, place: true };
-        let request = Request { n_ticks, ends, goal: Goal::Farthest, way: Way::Free };
+        let request = Request { n_ticks, ends, goal: Goal::Farthest, way };
         let found = self.best(&request)?.filter(|(factor, _)| *factor >= 1.0);
         Ok(found.map(|(factor, mut voltages_v)| {
             voltages_v.iter_mut().for_each(|voltage| *voltage /= factor);

@@ -1,9 +1,9 @@
 //! Transitions by a program for each: the fewest ticks there are, for one axis or two together.
 
-use super::program::{Ends, Goal, Request, Way};
-use super::{Axis, AxisOptions, JumpError, Route};
+use super::program::Way;
+use super::transition::ask;
+use super::{Ask, Axis, AxisOptions, JumpError, Route};
 use ftheta_model::machine::Scanner;
-use ftheta_physics::galvo::State;
 
 /// From here on one tick more or less is less than a hundredth, and not every number is tried.
 const N_TICKS_EACH: usize = 200;
@@ -67,26 +67,16 @@ fn may_reach(axis: &Axis, route: &Route, n_ticks: usize) -> bool {
 }
 
 /// The voltages of one axis in this many ticks.
-///
-/// What can be reached is convex and contains rest at the start, so a route is possible if the
-/// longest in its direction is at least as long.
 fn reach(
     axis: &Axis,
     route: &Route,
     angle_max_rad: f64,
     n_ticks: usize,
 ) -> Result<Option<Vec<f64>>, JumpError> {
-    let distance_rad = route.to_rad - route.from_rad;
-    if distance_rad == 0.0 && route.from_rad_s == 0.0 && route.to_rad_s == 0.0 {
+    let ask = ask(route);
+    if ask == (Ask { distance_rad: 0.0, from_rad_s: 0.0, to_rad_s: 0.0 }) {
         return Ok(Some(vec![0.0; n_ticks]));
     }
-    let start = State::new(0.0, route.from_rad_s, 0.0, 0.0, 0.0);
-    let end = State::new(distance_rad, route.to_rad_s, 0.0, 0.0, 0.0);
-    let ends = Ends { start, end, place: true };
     let way = Way::Within(-angle_max_rad - route.from_rad, angle_max_rad - route.from_rad);
-    let found = axis.best(&Request { n_ticks, ends, goal: Goal::Farthest, way })?;
-    Ok(found.filter(|(factor, _)| *factor >= 1.0).map(|(factor, mut voltages_v)| {
-        voltages_v.iter_mut().for_each(|voltage| *voltage /= factor);
-        voltages_v
-    }))
+    axis.meet(&ask, way, n_ticks)
 }

@@ -6,6 +6,7 @@
 
 use super::brake::{Brakes, End, Fit};
 use super::fan::{Ask, Fan, Sum, Term};
+use super::program::Way;
 use super::{Atlas, AtlasOptions, Axis, AxisOptions, JumpError};
 use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::{CURRENT, State};
@@ -185,7 +186,7 @@ impl Transitions {
             if !self.may_meet(route, n_ticks) {
                 continue;
             }
-            let Some(voltages_v) = self.axis.meet(&ask, n_ticks)? else {
+            let Some(voltages_v) = self.axis.meet(&ask, Way::Free, n_ticks)? else {
                 continue;
             };
             let phases = [Phase::Own(voltages_v), Phase::Rest(0), Phase::Rest(0)];
@@ -237,9 +238,7 @@ impl Transitions {
         let duration_s = n_ticks as f64 * self.axis.tick_s;
         let mean_rad_s = 0.5 * (ask.from_rad_s + ask.to_rad_s);
         let displacement = (ask.distance_rad - mean_rad_s * duration_s).abs();
-        let gain_max = self.axis.galvo.torque_constant / self.axis.galvo.inertia()
-            * self.axis.current_max_a
-            * duration_s;
+        let gain_max = self.axis.acceleration_max_rad_s2() * duration_s;
         let longest = self.atlas.steps_rad().get(n_ticks).copied().unwrap_or(f64::INFINITY);
         displacement <= SLACK * longest && (ask.to_rad_s - ask.from_rad_s).abs() <= gain_max
     }
@@ -401,7 +400,8 @@ impl Transitions {
     }
 }
 
-fn ask(route: &Route) -> Ask {
+/// What a route asks of its axis, wherever it lies.
+pub(super) fn ask(route: &Route) -> Ask {
     Ask {
         distance_rad: route.to_rad - route.from_rad,
         from_rad_s: route.from_rad_s,
