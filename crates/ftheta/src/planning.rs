@@ -9,8 +9,8 @@ use ftheta_model::warning::Warning;
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
 use ftheta_planner::classic::{self, Settings};
-use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model};
-use ftheta_planner::optimal::{self, Restraint};
+use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
+use ftheta_planner::optimal::{self, OptimalOptions, Restraint};
 
 /// Part of the tolerance that may be left of a jump when a mark begins (`design/control.md`).
 const JUMP_SHARE: f64 = 1.0 / 3.0;
@@ -55,18 +55,16 @@ impl Planning<'_> {
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
-        let Self { machine, settings, options } = *self;
-        let tolerance_mm = options.tolerance_mm;
+        let Self { machine, options, .. } = *self;
+        let (tolerance_mm, corner) = (options.tolerance_mm, options.corner);
         let mut refused = None;
         for restraint in optimal::RESTRAINTS {
-            let mut atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
+            let atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
             observer(Stage::Plan);
-            let n_kept = atlas.n_sequences();
-            let jumps = (&mut atlas, restraint.heat_share);
-            let draft = optimal::draft(toolpath.clone(), machine, settings, tolerance_mm, jumps)?;
-            if atlas.n_sequences() > n_kept {
-                options.atlas_store.save(&atlas, warnings);
-            }
+            let voltage_reserve = atlas.axis_options().voltage_reserve;
+            let transitions = Transitions::with_atlas(atlas)?;
+            let optimal = OptimalOptions { tolerance_mm, corner, voltage_reserve, restraint };
+            let draft = optimal::draft(toolpath.clone(), machine, &transitions, &optimal)?;
             observer(Stage::Audit);
             match Plan::new(draft) {
                 Ok(plan) => return Ok(plan),
