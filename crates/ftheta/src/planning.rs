@@ -12,8 +12,9 @@ use ftheta_planner::classic::{self, Settings};
 use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
 use ftheta_planner::optimal::{self, OptimalOptions, Restraint};
 
-/// Part of the tolerance that may be left of a jump when a mark begins (`design/control.md`).
-const JUMP_SHARE: f64 = 1.0 / 3.0;
+/// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
+/// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
+const HELD_SHARE: f64 = 0.65;
 
 /// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
 const EPSILON_MIN_RAD: f64 = 2e-8;
@@ -90,9 +91,9 @@ impl Planning<'_> {
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Atlas, Error> {
         let Self { machine, options, .. } = *self;
-        let epsilon_rad = JUMP_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
+        let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
         let axis = AxisOptions {
-            model: Model::Robust {
+            model: Model::Held {
                 epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD),
             },
             tick_s: machine.output.period_s(),

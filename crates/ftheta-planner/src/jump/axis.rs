@@ -1,6 +1,7 @@
 //! One axis as the jump programs see it: discrete motion, limits, and plants to be robust against.
 
 use super::fan::Ask;
+use super::held::Held;
 use super::program::{self, Ends, Goal, Request, Way};
 use super::{JumpError, polish};
 use ftheta_model::machine::Scanner;
@@ -41,6 +42,13 @@ pub enum Model {
     /// vibration included, and stays there; nominally no current is left.
     Robust {
         /// Allowed end error, rad mechanical.
+        epsilon_rad: f64,
+    },
+    /// The nominal mode, exactly at the end; held by the servo, every plant whose mode and torque
+    /// constant are within the scanner's uncertainty stays within this many rad of the nominal
+    /// mirror from there on.
+    Held {
+        /// Allowed distance, rad mechanical.
         epsilon_rad: f64,
     },
 }
@@ -129,6 +137,8 @@ pub struct Axis {
     /// Plants whose distance from rest is bounded, and the bound, rad.
     pub(super) plants: Vec<Plant>,
     pub(super) residual_max_rad: f64,
+    /// Plants that the servo has to hold within the same bound.
+    pub(super) held: Vec<Held>,
     /// Current where it is checked inside the tick.
     inside: Vec<Weights>,
     /// The same where the program bounds it.
@@ -148,13 +158,18 @@ impl Axis {
         let (galvo, active, rest): (Galvo, &'static [usize], &'static [usize]) = match options.model
         {
             Model::Rigid => (rigid(&nominal), &[0, 1, 4], &[1, 4]),
-            Model::Flexible => (nominal, &[0, 1, 2, 3, 4], &[1, 2, 3, 4]),
+            Model::Flexible | Model::Held { .. } => (nominal, &[0, 1, 2, 3, 4], &[1, 2, 3, 4]),
             Model::Robust { .. } => (nominal, &[0, 1, 2, 3, 4], &[4]),
         };
         let mut plants = Vec::new();
         let mut residual_max_rad = f64::INFINITY;
         if let Model::Robust { epsilon_rad } = options.model {
             plants = uncertain(&nominal, scanner.f1_uncertainty, options.tick_s);
+            residual_max_rad = ERROR_SHARE * epsilon_rad;
+        }
+        let mut held = Vec::new();
+        if let Model::Held { epsilon_rad } = options.model {
+            held = Held::plants(scanner, options.tick_s)?;
             residual_max_rad = ERROR_SHARE * epsilon_rad;
         }
         let (inside, bounded) = match options.current_bound {
@@ -177,6 +192,7 @@ impl Axis {
             galvo,
             plants,
             residual_max_rad,
+            held,
             inside,
             bounded,
         })
@@ -358,7 +374,7 @@ fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
 fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpError> {
     let tiny = f64::MIN_POSITIVE;
     let epsilon_rad = match options.model {
-        Model::Robust { epsilon_rad } => epsilon_rad,
+        Model::Robust { epsilon_rad } | Model::Held { epsilon_rad } => epsilon_rad,
         Model::Rigid | Model::Flexible => 1.0,
     };
     let ranges = [
@@ -372,6 +388,7 @@ fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpError> {
         ("greatest voltage V", scanner.voltage_max_v, tiny, 1e4),
         ("greatest current A", scanner.current_max_a, tiny, 1e4),
         ("uncertainty of the torsional mode", scanner.f1_uncertainty, 0.0, 0.5),
+        ("uncertainty of the torque constant", scanner.kt_uncertainty, 0.0, 0.5),
         ("tick s", options.tick_s, 1e-9, 1e-2),
         ("voltage reserve", options.voltage_reserve, 0.0, 0.95),
         ("allowed end error rad", epsilon_rad, 1e-12, 1.0),

@@ -5,6 +5,7 @@
 
 use super::JumpError;
 use super::axis::{Axis, N_LOOKS};
+use super::held::N_DEVIATIONS;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus,
@@ -119,6 +120,13 @@ impl Units {
     }
 }
 
+impl Units {
+    /// Unit of a held plant's deviation: hundredths of the state's own.
+    fn deviation(&self, index: usize) -> f64 {
+        0.01 * self.state.get(index).copied().unwrap_or(self.voltage)
+    }
+}
+
 /// Rows and entries of the program under construction.
 #[derive(Default)]
 struct Rows {
@@ -149,6 +157,7 @@ struct Layout {
     n_ticks: usize,
     n_states: usize,
     n_plants: usize,
+    n_held: usize,
 }
 
 impl Layout {
@@ -175,8 +184,13 @@ impl Layout {
         self.deviation(plant, DEVIATING.len() + look)
     }
 
+    /// Column of a held plant's deviation.
+    fn held(&self, plant: usize, index: usize) -> usize {
+        self.deviation(self.n_plants, 0) + N_DEVIATIONS * plant + index
+    }
+
     fn n_columns(&self) -> usize {
-        self.deviation(self.n_plants, 0)
+        self.held(self.n_held, 0)
     }
 }
 
@@ -195,15 +209,22 @@ struct Program<'a> {
 /// If the solver does not reach its tolerance.
 pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpError> {
     let n_ticks = request.n_ticks;
-    let layout = Layout { n_ticks, n_states: axis.active.len(), n_plants: axis.plants.len() };
+    let layout = Layout {
+        n_ticks,
+        n_states: axis.active.len(),
+        n_plants: axis.plants.len(),
+        n_held: axis.held.len(),
+    };
     let units = Units::new(axis, request);
     let mut program = Program { axis, request, layout, units, rows: Rows::default() };
     program.motion();
     program.ends();
     program.deviations();
+    program.held_deviations();
     let n_equal = program.rows.right.len();
     program.bounds();
     program.way();
+    program.held_bounds();
     program.creep_sizes();
     let n_bounds = program.rows.right.len() - n_equal;
     program.residuals();
@@ -340,6 +361,45 @@ impl Program<'_> {
                     }
                 }
                 rows.add(entries, 0.0);
+            }
+        }
+    }
+
+    /// Adds how each held plant deviates at the end.
+    fn held_deviations(&mut self) {
+        let Self { axis, request, layout, units, rows } = self;
+        for (plant, one) in axis.held.iter().enumerate() {
+            for index in 0..N_DEVIATIONS {
+                let unit = units.deviation(index);
+                let ticks = one.deviation(index, request.n_ticks);
+                let from_factor = ticks[0].0.dot(&request.ends.start) * units.factor / unit;
+                let mut entries =
+                    vec![(layout.held(plant, index), -1.0), (layout.factor(), from_factor)];
+                for (tick, (weights, gain)) in ticks.iter().enumerate() {
+                    entries.push((layout.voltage(tick), gain * units.voltage / unit));
+                    if tick > 0 {
+                        entries.extend(axis.active.iter().enumerate().map(|(position, &from)| {
+                            (layout.state(tick, position), weights[from] * units.state[from] / unit)
+                        }));
+                    }
+                }
+                rows.add(entries, 0.0);
+            }
+        }
+    }
+
+    /// Adds that each held plant is near the nominal mirror at each look.
+    fn held_bounds(&mut self) {
+        let Self { axis, layout, units, rows, .. } = self;
+        for (plant, one) in axis.held.iter().enumerate() {
+            for weights in &one.looks {
+                for sign in [1.0, -1.0] {
+                    let entries = (0..N_DEVIATIONS).map(|index| {
+                        let weight = sign * weights[index] * units.deviation(index);
+                        (layout.held(plant, index), weight / axis.residual_max_rad)
+                    });
+                    rows.add(entries, 1.0);
+                }
             }
         }
     }
