@@ -17,6 +17,7 @@ mod program;
 mod transition;
 
 pub use atlas::{ATLAS_VERSION, Atlas, AtlasOptions, Jump, Level, N_LEVELS};
+pub(crate) use axis::check as check_axis;
 pub use axis::{Axis, AxisOptions, CurrentBound, Model, Reach};
 pub use error::JumpError;
 pub use exact::fewest_ticks_between;

@@ -4,6 +4,8 @@
 
 mod builder;
 pub mod classic;
+mod convex;
+pub mod corner;
 mod error;
 pub mod jump;
 pub mod law;

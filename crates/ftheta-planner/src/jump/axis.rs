@@ -371,7 +371,8 @@ fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
         .collect()
 }
 
-fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpError> {
+/// Whether scanner and options are in range.
+pub(crate) fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpError> {
     let tiny = f64::MIN_POSITIVE;
     let epsilon_rad = match options.model {
         Model::Robust { epsilon_rad } | Model::Held { epsilon_rad } => epsilon_rad,

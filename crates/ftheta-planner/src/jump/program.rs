@@ -6,18 +6,9 @@
 use super::JumpError;
 use super::axis::{Axis, N_LOOKS};
 use super::held::N_DEVIATIONS;
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus,
-    SupportedConeT, ZeroConeT,
-};
+use crate::convex::{self, Rows};
+use clarabel::solver::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use ftheta_physics::galvo::{CURRENT, State};
-
-/// Balancing and regularisation of the solver, in the order tried. With its own 1e-8 one robust
-/// program in fifty stalls; with 1e-7 one in four hundred, most of which the others finish.
-const ATTEMPTS: [(bool, f64); 3] = [(true, 1e-7), (true, 1e-8), (false, 1e-7)];
-/// Feasibility and gap, in units of the largest values.
-const TOLERANCE: f64 = 1e-9;
 
 /// States in which a plant's end differs from the nominal one; the angle does not act on anything.
 const DEVIATING: [usize; 4] = [1, 2, 3, 4];
@@ -118,36 +109,10 @@ impl Units {
         let size = start.component_div(&state).amax().max(end.component_div(&state).amax());
         Self { voltage, state, factor: size.recip() }
     }
-}
 
-impl Units {
     /// Unit of a held plant's deviation: hundredths of the state's own.
     fn deviation(&self, index: usize) -> f64 {
         0.01 * self.state.get(index).copied().unwrap_or(self.voltage)
-    }
-}
-
-/// Rows and entries of the program under construction.
-#[derive(Default)]
-struct Rows {
-    row: Vec<usize>,
-    column: Vec<usize>,
-    value: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl Rows {
-    /// Adds a row with these entries; those of value zero are left out.
-    fn add(&mut self, entries: impl IntoIterator<Item = (usize, f64)>, right: f64) {
-        let row = self.right.len();
-        for (column, value) in entries {
-            if value != 0.0 {
-                self.row.push(row);
-                self.column.push(column);
-                self.value.push(value);
-            }
-        }
-        self.right.push(right);
     }
 }
 
@@ -221,17 +186,28 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
     program.ends();
     program.deviations();
     program.held_deviations();
-    let n_equal = program.rows.right.len();
+    let n_equal = program.rows.len();
     program.bounds();
     program.way();
     program.held_bounds();
     program.creep_sizes();
-    let n_bounds = program.rows.right.len() - n_equal;
+    let n_bounds = program.rows.len() - n_equal;
     program.residuals();
     let mut cones = vec![ZeroConeT(n_equal), NonnegativeConeT(n_bounds)];
     cones.resize(2 + axis.plants.len() * N_LOOKS, SecondOrderConeT(3));
     let Program { layout, units, rows, .. } = program;
-    let x = optimise(rows, &cones, &layout, request.goal)
+    let mut cost = vec![0.0; layout.n_columns()];
+    let squared = match request.goal {
+        Goal::Farthest => {
+            cost[layout.factor()] = -1.0;
+            Vec::new()
+        }
+        Goal::Coolest(_) => {
+            (1..=n_ticks).map(|tick| layout.state(tick, layout.n_states - 1)).collect()
+        }
+    };
+    let x = convex::minimise(rows, &cones, &cost, squared)
+        .and_then(|x| x.ok_or_else(|| "PrimalInfeasible".into()))
         .map_err(|status| JumpError::Unsolved { n_ticks, tick_us: axis.tick_s * 1e6, status })?;
     let voltage = |tick| x[layout.voltage(tick)] * units.voltage;
     Ok(Solution {
@@ -241,57 +217,6 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
         },
         voltages_v: (0..n_ticks).map(voltage).collect(),
     })
-}
-
-/// The best variables; else the solver's status.
-fn optimise(
-    rows: Rows,
-    cones: &[SupportedConeT<f64>],
-    layout: &Layout,
-    goal: Goal,
-) -> Result<Vec<f64>, String> {
-    let Rows { row, column, value, right } = rows;
-    let (n_rows, n_columns) = (right.len(), layout.n_columns());
-    let a = CscMatrix::new_from_triplets(n_rows, n_columns, row, column, value);
-    let mut cost = vec![0.0; n_columns];
-    let p = match goal {
-        Goal::Farthest => {
-            cost[layout.factor()] = -1.0;
-            CscMatrix::zeros((n_columns, n_columns))
-        }
-        Goal::Coolest(_) => {
-            let currents: Vec<usize> =
-                (1..=layout.n_ticks).map(|tick| layout.state(tick, layout.n_states - 1)).collect();
-            let ones = vec![1.0; currents.len()];
-            CscMatrix::new_from_triplets(n_columns, n_columns, currents.clone(), currents, ones)
-        }
-    };
-    let mut ended = Err(String::new());
-    for (equilibrate_enable, static_regularization_constant) in ATTEMPTS {
-        let settings = DefaultSettings {
-            verbose: false,
-            tol_gap_abs: TOLERANCE,
-            tol_gap_rel: TOLERANCE,
-            tol_feas: TOLERANCE,
-            equilibrate_enable,
-            static_regularization_constant,
-            // More threads would only contend with the atlas's own.
-            max_threads: 1,
-            ..DefaultSettings::default()
-        };
-        let mut solver = DefaultSolver::new(&p, &cost, &a, &right, cones, settings)
-            .map_err(|error| error.to_string())?;
-        solver.solve();
-        let solution = solver.solution;
-        match solution.status {
-            SolverStatus::Solved => return Ok(solution.x),
-            // The factor may be 5e-5 short; the polish that follows keeps all limits anyhow.
-            SolverStatus::AlmostSolved => ended = Ok(solution.x),
-            status if ended.is_err() => ended = Err(format!("{status:?}")),
-            _ => {}
-        }
-    }
-    ended
 }
 
 impl Program<'_> {
