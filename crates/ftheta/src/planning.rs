@@ -8,13 +8,15 @@ use ftheta_model::toolpath::Toolpath;
 use ftheta_model::warning::Warning;
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
+use ftheta_physics::servo::Gains;
 use ftheta_planner::classic::{self, Settings};
+use ftheta_planner::corner::Corners;
 use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
 use ftheta_planner::optimal::{self, OptimalOptions, Restraint};
 
 /// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
 /// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
-const HELD_SHARE: f64 = 0.65;
+const HELD_SHARE: f64 = 0.75;
 
 /// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
 const EPSILON_MIN_RAD: f64 = 2e-8;
@@ -65,7 +67,12 @@ impl Planning<'_> {
             let voltage_reserve = atlas.axis_options().voltage_reserve;
             let transitions = Transitions::with_atlas(atlas)?;
             let optimal = OptimalOptions { tolerance_mm, corner, voltage_reserve, restraint };
-            let draft = optimal::draft(toolpath.clone(), machine, &transitions, &optimal)?;
+            let gains = Gains::design(&machine.scanner, machine.output.period_s())?;
+            let scanner = transitions.atlas().scanner().clone();
+            let corners =
+                Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
+            let motions = (&transitions, Some(&corners));
+            let draft = optimal::draft(toolpath.clone(), machine, motions, &optimal)?;
             observer(Stage::Audit);
             match Plan::new(draft) {
                 Ok(plan) => return Ok(plan),

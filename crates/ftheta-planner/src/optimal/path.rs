@@ -58,6 +58,30 @@ impl Path {
         self.stations[self.stations.len() - 1].distance_mm
     }
 
+    /// The paths and curves between vertices, which are corners of the curve.
+    pub(super) fn cut(&self, curve: &BezPath, vertices: &[usize]) -> Vec<(Self, BezPath)> {
+        let mut parts = Vec::with_capacity(vertices.len() + 1);
+        let mut segments = curve.segments().peekable();
+        let mut first = 0;
+        let last = self.vertices.len() - 1;
+        for &vertex in vertices.iter().chain([&last]) {
+            let end = self.vertices[vertex];
+            let mut part = Vec::new();
+            while let Some(segment) = segments.next() {
+                part.push(segment);
+                let rest = segments.peek();
+                // The last part takes all that is left.
+                if vertex != last && segment.end().distance(end) <= SAME_PLACE_MM && rest.is_some()
+                {
+                    break;
+                }
+            }
+            parts.push((self.part(first, vertex), BezPath::from_path_segments(part.into_iter())));
+            first = vertex;
+        }
+        parts
+    }
+
     /// The part from one vertex to another.
     pub(super) fn part(&self, first: usize, last: usize) -> Self {
         let start_mm = self.stations[first].distance_mm;

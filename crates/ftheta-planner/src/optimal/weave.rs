@@ -79,6 +79,15 @@ impl<'a> Weave<'a> {
         (self.n_samples + 1) as f64 * self.period_s
     }
 
+    pub(super) fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// Whether the motors stand these voltages from a state, with the heat they have.
+    pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States) -> bool {
+        self.fly_by.allows(voltages, from, &self.heat)
+    }
+
     /// Puts a stretch into the tables.
     ///
     /// # Errors
