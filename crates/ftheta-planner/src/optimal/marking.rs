@@ -98,20 +98,31 @@ impl Marking<'_> {
         }
         let start_s = self.weave.now_s();
         let mut end_s = start_s;
-        let mut powers = Powers::new();
+        let mut progress_mm = Vec::new();
+        let corner_mm = |turn: &Turn| path.stations[turn.vertex].distance_mm;
         for (piece_index, piece) in pieces.iter().enumerate() {
             let piece_s = self.weave.now_s();
             self.weave.follow(index, &piece.laid);
-            self.powers(&mut powers, pen, piece, piece_s);
+            let before = piece_index.checked_sub(1).and_then(|before| turns.get(before));
+            let offset_mm = before.map_or(0.0, |turn| corner_mm(turn));
+            add_progress(&mut progress_mm, &self.progress_mm(piece), offset_mm);
             end_s = piece_s + time_at_s(&piece.stretch.knots, piece.stretch.path.length_mm());
             if let (Some(voltages), Some(turn)) = (joints.get(piece_index), turns.get(piece_index))
             {
-                let turn_s = self.weave.now_s();
                 self.weave.drive(Some(index), voltages);
                 let parts = [piece.part, pieces[piece_index + 1].part];
-                self.turn_powers(&mut powers, pen, &turn.speeds_mm_s(parts), turn_s);
+                add_progress(&mut progress_mm, &turn.progress_mm(parts), corner_mm(turn));
             }
         }
+        let steady = pieces.len() == 1 && pieces[0].stretch.knots.len() == 1;
+        let laser = &self.weave.machine.laser;
+        let powers = match laser.power_modulated && !steady {
+            true => {
+                let times_s = (start_s, self.weave.period_s());
+                powers(pen, laser.power_max_w, &progress_mm, times_s)
+            }
+            false => Powers::new(),
+        };
         let planned = PlannedMark {
             curve: mark.curve,
             pen_index: mark.pen_index,
@@ -231,29 +242,17 @@ impl Marking<'_> {
         Some(joints)
     }
 
-    /// Power along a stretch, where it differs from the pen's.
-    fn powers(&self, powers: &mut Powers, pen: &Pen, piece: &Piece, start_s: f64) {
-        if !self.weave.machine.laser.power_modulated {
-            return;
-        }
-        let Stretch { knots, .. } = &piece.stretch;
+    /// Progress of the beam along the path at every tick of a stretch, from the first to the end,
+    /// mm.
+    fn progress_mm(&self, piece: &Piece) -> Vec<f64> {
+        let Stretch { knots, path, .. } = &piece.stretch;
+        let n_ticks = piece.laid.n_ticks();
         if let [knot] = knots[..] {
-            powers.push((start_s, power_w(pen, knot.speed_mm_s)));
-            return;
+            let step_mm = knot.speed_mm_s * self.weave.period_s();
+            let first_mm = knot.distance_mm - knot.speed_mm_s * knot.time_s;
+            return (0..=n_ticks).map(|tick| first_mm + f64::from(tick) * step_mm).collect();
         }
-        let speeds_mm_s = self.weave.speeds_mm_s(knots, piece.laid.n_ticks());
-        self.turn_powers(powers, pen, &speeds_mm_s, start_s);
-    }
-
-    /// Power tick by tick.
-    fn turn_powers(&self, powers: &mut Powers, pen: &Pen, speeds_mm_s: &[f64], start_s: f64) {
-        if !self.weave.machine.laser.power_modulated {
-            return;
-        }
-        let period_s = self.weave.period_s();
-        powers.extend(speeds_mm_s.iter().enumerate().map(|(tick, &speed_mm_s)| {
-            (start_s + tick as f64 * period_s, power_w(pen, speed_mm_s))
-        }));
+        path.nearest_mm(&self.weave.places(&piece.laid))
     }
 
     fn limits(&self, pen: &Pen) -> SpeedLimits {
@@ -282,7 +281,34 @@ impl Marking<'_> {
     }
 }
 
-/// Power at a speed: the same energy on every millimetre.
-fn power_w(pen: &Pen, speed_mm_s: f64) -> f64 {
-    pen.power_w * (speed_mm_s / pen.mark_speed_mm_s).clamp(POWER_MIN, 1.0)
+/// Appends places along a stretch, whose first tick is the last of the stretch before.
+///
+/// * `offset_mm`: what they count from, along the whole path
+fn add_progress(all_mm: &mut Vec<f64>, stretch_mm: &[f64], offset_mm: f64) {
+    all_mm.pop();
+    all_mm.extend(stretch_mm.iter().map(|at_mm| at_mm + offset_mm));
+}
+
+/// Power of each tick, so that every millimetre gets the pen's energy: what a tick cannot give,
+/// because the laser has no more, the next one does.
+///
+/// * `progress_mm`: along the path, at each tick from `start_s` on
+fn powers(
+    pen: &Pen,
+    power_max_w: f64,
+    progress_mm: &[f64],
+    (start_s, period_s): (f64, f64),
+) -> Powers {
+    let energy_j_mm = pen.power_w / pen.mark_speed_mm_s;
+    let most_mm = power_max_w * period_s / energy_j_mm;
+    let least_mm = POWER_MIN * pen.mark_speed_mm_s * period_s;
+    let mut given_mm = progress_mm.first().copied().unwrap_or(0.0);
+    let windows = progress_mm.windows(2).enumerate();
+    windows
+        .map(|(tick, pair)| {
+            let step_mm = (pair[1] - given_mm).clamp(least_mm, most_mm);
+            given_mm += step_mm;
+            (start_s + tick as f64 * period_s, step_mm * energy_j_mm / period_s)
+        })
+        .collect()
 }

@@ -32,12 +32,16 @@ pub(super) struct Turn {
     sides: [TurnSide; 2],
     n_ticks: usize,
     tick_s: f64,
+    /// Cosine of the turning angle.
+    cosine: f64,
 }
 
 /// One side, for a speed of one of what it was asked for.
 #[derive(Clone, Debug)]
 struct TurnSide {
+    end: End,
     side: Side,
+    tick_s: f64,
     /// Direction in mirror angles, length 1.
     direction: Vec2,
     /// Field distance per mirror angle along the leg, mm/rad.
@@ -77,7 +81,9 @@ impl Turn {
             };
             let coast_v = machine.scanner.torque_constant_n_m_a * speed_rad_s;
             sides.push(TurnSide {
+                end,
                 side,
+                tick_s: machine.output.period_s(),
                 direction: unit,
                 mm_per_rad,
                 n_coasting: 0,
@@ -99,7 +105,8 @@ impl Turn {
         depart.n_coasting = n_after - after(&depart);
         let n_ticks = n_before + n_after;
         let tick_s = machine.output.period_s();
-        Ok(Some(Self { vertex, sides: [arrive, depart], n_ticks, tick_s }))
+        let cosine = theta.cos();
+        Ok(Some(Self { vertex, sides: [arrive, depart], n_ticks, tick_s, cosine }))
     }
 
     /// Time at the speed of the leg from where it begins to the corner, and from the corner to
@@ -109,10 +116,6 @@ impl Turn {
             let TurnSide { side, n_coasting, .. } = &self.sides[index];
             side.run_rad / side.speed_rad_s + *n_coasting as f64 * self.tick_s
         })
-    }
-
-    pub(super) fn n_ticks(&self) -> usize {
-        self.n_ticks
     }
 
     /// Voltages of both axes with the legs' speeds as parts of the one asked for.
@@ -135,24 +138,42 @@ impl Turn {
         voltages
     }
 
-    /// Progress of the beam in each tick along both legs, mm/s.
-    pub(super) fn speeds_mm_s(&self, parts: [f64; 2]) -> Vec<f64> {
-        let mut speeds = vec![0.0; self.n_ticks];
-        for (index, (one, part)) in self.sides.iter().zip(parts).enumerate() {
-            let TurnSide { side, mm_per_rad, n_coasting, n_resting, .. } = one;
-            let coasting = std::iter::repeat_n(side.speed_rad_s * self.tick_s, *n_coasting);
-            let own = side.mirror_rad.windows(2).map(|pair| pair[1] - pair[0]);
-            let resting = std::iter::repeat_n(0.0, *n_resting);
-            let all: Vec<f64> = if index == 0 {
-                coasting.chain(own).chain(resting).collect()
-            } else {
-                resting.chain(own).chain(coasting).collect()
-            };
-            for (speed, way_rad) in speeds.iter_mut().zip(all) {
-                *speed += part * way_rad * mm_per_rad / self.tick_s;
-            }
-        }
-        speeds
+    /// Place along the path of the point nearest to the beam, from the corner, at each tick from
+    /// the first to the end, mm. At the corner's tick it passes from one leg to the other.
+    pub(super) fn progress_mm(&self, parts: [f64; 2]) -> Vec<f64> {
+        let [arrive, depart] = [0, 1].map(|index: usize| self.sides[index].places_mm(parts[index]));
+        let n_before = self.sides[0].n_coasting + self.sides[0].side.n_before;
+        let cosine = self.cosine;
+        let progress = |(tick, (alpha, beta)): (usize, (f64, f64))| match tick.cmp(&n_before) {
+            std::cmp::Ordering::Less => (alpha + beta * cosine).min(0.0),
+            std::cmp::Ordering::Equal => 0.0,
+            std::cmp::Ordering::Greater => (beta + alpha * cosine).max(0.0),
+        };
+        arrive.into_iter().zip(depart).enumerate().map(progress).collect()
+    }
+}
+
+impl TurnSide {
+    /// Place of this side's motion along its leg at each tick, from the corner, mm.
+    fn places_mm(&self, part: f64) -> Vec<f64> {
+        let Self { side, mm_per_rad, n_coasting, n_resting, tick_s, .. } = self;
+        let step_rad = side.speed_rad_s * tick_s;
+        let first = side.mirror_rad[0];
+        let last = side.mirror_rad[side.mirror_rad.len() - 1];
+        let own = side.mirror_rad.iter().copied();
+        let places_rad: Vec<f64> = match self.end {
+            End::Arrive => (0..*n_coasting)
+                .rev()
+                .map(|tick| first - (tick + 1) as f64 * step_rad)
+                .chain(own)
+                .chain(std::iter::repeat_n(last, *n_resting))
+                .collect(),
+            End::Depart => std::iter::repeat_n(first, *n_resting)
+                .chain(own)
+                .chain((0..*n_coasting).map(|tick| last + (tick + 1) as f64 * step_rad))
+                .collect(),
+        };
+        places_rad.into_iter().map(|place_rad| place_rad * part * mm_per_rad).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use super::path::Path;
 use super::smoothing::Smoothing;
 use super::speed::time_at_s;
 use crate::PlanError;
-use crate::render::track::angles_around;
+use crate::render::track::{angles_around, places};
 use ftheta_model::block::LaserEdge;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Knot, Motion, PlanDraft, PlannedMark, Segment};
@@ -218,21 +218,9 @@ impl<'a> Weave<'a> {
         Ok(())
     }
 
-    /// Speed along a track that has been laid, averaged as its places are, at every tick, mm/s.
-    pub(super) fn speeds_mm_s(&self, knots: &[Knot], n_ticks: u32) -> Vec<f64> {
-        let shares = super::smoothing::shares(self.smoothing.n_ticks);
-        let half = 0.5 * (shares.len() - 1) as f64;
-        let n = n_ticks as usize + shares.len();
-        // Distances at the ends of ticks, averaged; their differences are the speeds.
-        let mut cursor = 0;
-        let base: Vec<f64> = (0..n)
-            .map(|index| distance_mm(knots, &mut cursor, (index as f64 - half) * self.period_s))
-            .collect();
-        let mean = |first: usize| -> f64 {
-            base[first..].iter().zip(&shares).map(|(at_mm, share)| at_mm * share).sum()
-        };
-        let averaged: Vec<f64> = (0..=n_ticks as usize).map(mean).collect();
-        averaged.windows(2).map(|pair| (pair[1] - pair[0]) / self.period_s).collect()
+    /// Places of the beam at every tick of a track, from the first to the end.
+    pub(super) fn places(&self, laid: &Laid) -> Vec<Point> {
+        places(&self.draft, &laid.motion, laid.n_ticks)
     }
 }
 
@@ -248,20 +236,4 @@ impl Laid {
     pub(super) fn ends(&self) -> &States {
         &self.ends
     }
-}
-
-/// Distance that a profile has covered at a time; times may not fall.
-fn distance_mm(knots: &[Knot], cursor: &mut usize, time_s: f64) -> f64 {
-    while knots.get(*cursor + 1).is_some_and(|next| next.time_s <= time_s) {
-        *cursor += 1;
-    }
-    let from = knots[*cursor];
-    let since_s = time_s - from.time_s;
-    let gain = match knots.get(*cursor + 1) {
-        Some(to) if since_s > 0.0 => {
-            (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s) * since_s
-        }
-        _ => 0.0,
-    };
-    from.distance_mm + (from.speed_mm_s + 0.5 * gain) * since_s
 }

@@ -100,6 +100,11 @@ impl Track {
     }
 }
 
+/// Places of a track, averaged, at every tick from the first to the last of `n_ticks`.
+pub(crate) fn places(plan: &PlanDraft, motion: &Motion, n_ticks: u32) -> Vec<Point> {
+    averaged(plan, motion, 0.0, n_ticks as usize + 1)
+}
+
 /// Wanted mirror angles of each axis around a tick of a track's profile; `Err` with a place that
 /// `angles` does not reach.
 pub(crate) fn angles_around(
@@ -108,27 +113,32 @@ pub(crate) fn angles_around(
     tick: u32,
     angles: impl Fn(Point) -> Option<[f64; 2]>,
 ) -> Result<[Taps; 2], Point> {
+    let first_tick = f64::from(tick) - TAPS_BEFORE as f64;
+    let mut around = [[0.0; N_TAPS]; 2];
+    for (tap, place) in averaged(plan, motion, first_tick, N_TAPS).into_iter().enumerate() {
+        [around[0][tap], around[1][tap]] = angles(place).ok_or(place)?;
+    }
+    Ok(around)
+}
+
+/// Averaged places of a track from a tick on; none of other motion.
+fn averaged(plan: &PlanDraft, motion: &Motion, first_tick: f64, n_places: usize) -> Vec<Point> {
     let (&Motion::Track { smoothing_ticks, .. }, Some(mut cursor)) =
         (motion, TrackCursor::new(plan, motion))
     else {
-        return Ok([[0.0; N_TAPS]; 2]);
+        return Vec::new();
     };
     let n = smoothing_ticks as usize;
-    let first_tick = f64::from(tick) - TAPS_BEFORE as f64 - 1.5 * (n - 1) as f64;
+    let first_tick = first_tick - 1.5 * (n - 1) as f64;
     let tick_s = plan.machine.output.period_s();
-    let places = (0..N_TAPS + 3 * (n - 1))
+    let base = (0..n_places + 3 * (n - 1))
         .map(|index| cursor.place(plan, (first_tick + index as f64) * tick_s));
-    let (mut x, mut y): (Vec<f64>, Vec<f64>) = places.map(|place| (place.x, place.y)).unzip();
+    let (mut x, mut y): (Vec<f64>, Vec<f64>) = base.map(|place| (place.x, place.y)).unzip();
     for _ in 0..3 {
         average(&mut x, n);
         average(&mut y, n);
     }
-    let mut around = [[0.0; N_TAPS]; 2];
-    for tap in 0..N_TAPS {
-        let place = Point::new(x[tap], y[tap]);
-        [around[0][tap], around[1][tap]] = angles(place).ok_or(place)?;
-    }
-    Ok(around)
+    x.into_iter().zip(y).map(|(x, y)| Point::new(x, y)).collect()
 }
 
 /// Replaces values by the mean of `n` neighbours each; there are n - 1 fewer of them.
