@@ -10,6 +10,7 @@ use crate::corner::Corners;
 use ftheta_model::plan::{Knot, PlannedMark};
 use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Mark;
+use ftheta_physics::follow::TAPS_AFTER;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::scale_mm_per_rad;
 
@@ -146,7 +147,9 @@ impl Marking<'_> {
             coverage_mm: COVERAGE_SHARE * tolerance_mm,
         };
         let speed = limits.speed_mm_s;
-        let margin_mm = speed * self.weave.smoothing.half_s;
+        // What the states at both ends of a turn are computed from has to be straight.
+        let margin_s = self.weave.smoothing.half_s + TAPS_AFTER as f64 * self.weave.period_s();
+        let margin_mm = speed * margin_s;
         let mut turns: Vec<Turn> = Vec::new();
         for vertex in self.sharp(path, limits) {
             let machine = self.weave.machine;
@@ -164,8 +167,8 @@ impl Marking<'_> {
                 None => path.stations[vertex].distance_mm,
             };
             let left_mm = path.length_mm() - path.stations[vertex].distance_mm;
-            let fits = straight_mm(path, vertex, false, before_mm) >= runs_mm[0]
-                && straight_mm(path, vertex, true, after_mm) >= runs_mm[1]
+            let fits = straight_mm(path, vertex, false, before_mm) >= before_mm
+                && straight_mm(path, vertex, true, after_mm) >= after_mm
                 && room_mm >= runs_mm[0]
                 && left_mm >= runs_mm[1];
             if fits {
