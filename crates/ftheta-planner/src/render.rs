@@ -67,13 +67,17 @@ struct Words<'a> {
 impl<'a> Renderer<'a> {
     /// Starts before the first sample.
     pub fn new(plan: &'a Plan) -> Self {
-        let output = &plan.machine.output;
         let optics = &plan.machine.optics;
         let table = MapTable::new(0.5 * optics.field_mm, EXACT_CELLS, |x, y| {
             let angles = angles_from_field(optics, FieldPoint::new(x, y))?;
             Some([angles.x_rad, angles.y_rad])
         });
-        let words = Words { plan, table, words_per_rad: 1.0 / output.word_step_rad() };
+        Self::with_table(plan, table)
+    }
+
+    fn with_table(plan: &'a Plan, table: Option<MapTable>) -> Self {
+        let words_per_rad = 1.0 / plan.machine.output.word_step_rad();
+        let words = Words { plan, table, words_per_rad };
         let cursor = Cursor::at(&plan.vertices, 0);
         let jumps = jump_shapes(plan);
         Self {
@@ -86,6 +90,12 @@ impl<'a> Renderer<'a> {
             next_index: 0,
             n_edges: 0,
         }
+    }
+
+    /// Starts before the first sample of another plan for the same machine, and saves making the
+    /// table of its optics again.
+    pub fn for_plan<'b>(&self, plan: &'b Plan) -> Renderer<'b> {
+        Renderer::with_table(plan, self.words.table.clone())
     }
 
     /// Fills `block` with what comes next; `false` after the end.
