@@ -1,9 +1,10 @@
 //! `ftheta mark`: the main job.
 
-use crate::arguments::Mark;
+use crate::arguments::{AgainstName, Mark};
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::{note, say};
+use ftheta::against::against;
 use ftheta::atlas_store::AtlasStore;
 use ftheta::formats::svg::SvgOptions;
 use ftheta::mark::{MarkOptions, Marked, mark};
@@ -44,6 +45,14 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let marked = mark(&drawing.value, &machine, &recipe, &options, &mut |stage| {
         progress.observe(stage);
     })?;
+    let against = arguments
+        .against
+        .map(|AgainstName::Classic| {
+            against(&drawing.value, &machine, &recipe, &options, &mut |stage| {
+                progress.observe(stage);
+            })
+        })
+        .transpose()?;
     progress.enter("write");
     let warnings: Vec<Warning> = drawing.warnings.iter().chain(&marked.warnings).cloned().collect();
     let about =

@@ -1,0 +1,225 @@
+//! The same job by the classic planner with its delays tuned: what other planners are compared with.
+
+mod bench;
+mod delays;
+mod descent;
+mod excerpt;
+
+use crate::Error;
+use crate::mark::{MarkOptions, PlanTimes, Stage, lay_out, plan_times};
+use bench::{Bench, Goal, Setup};
+use delays::Delays;
+use descent::{Rank, descend};
+use ftheta_formats::cache_key::CacheKey;
+use ftheta_formats::delays_file;
+use ftheta_model::job::Job;
+use ftheta_model::machine::Machine;
+use ftheta_model::recipe::{ClassicRecipe, Recipe};
+use ftheta_model::warning::Warning;
+use ftheta_physics::plan::Plan;
+use ftheta_planner::classic::{self, Settings};
+use ftheta_planner::render::Renderer;
+use ftheta_report::score::Score;
+
+/// A way to tune.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Way {
+    /// Its key in JSON and files.
+    pub key: &'static str,
+    /// Its name for people.
+    pub name: &'static str,
+    /// Whether the coverage error is within the tolerance as well.
+    pub coverage: bool,
+    /// Whether legs are skywritten.
+    pub sky: bool,
+}
+
+/// The columns of the comparison; the first is the one that figures use.
+pub const WAYS: [Way; 4] = [
+    Way { key: "a", name: "delays A", coverage: false, sky: false },
+    Way { key: "b", name: "delays B", coverage: true, sky: false },
+    Way { key: "sky_a", name: "skywriting A", coverage: false, sky: true },
+    Way { key: "sky_b", name: "skywriting B", coverage: true, sky: true },
+];
+
+/// What the classic planner makes of a job.
+pub struct Against {
+    /// In the order of [`WAYS`]; `None` where no delays keep the tolerance.
+    pub columns: [Option<Column>; WAYS.len()],
+    /// What a user has to know of the comparison.
+    pub warnings: Vec<Warning>,
+}
+
+/// The job with one set of tuned delays.
+pub struct Column {
+    /// The delays.
+    pub settings: Settings,
+    /// The plan.
+    pub plan: Plan,
+    /// Where its time goes.
+    pub times: PlanTimes,
+    /// What the beam did on the twin.
+    pub score: Score,
+}
+
+/// To be raised when the same job and machine would be tuned differently.
+const VERSION: u32 = 1;
+/// Jobs longer than this are tuned on an excerpt, s.
+const WHOLE_MAX_S: f64 = 0.5;
+/// Length of the excerpt, s.
+const EXCERPT_S: f64 = 0.15;
+/// How often the excerpt's tolerance is narrowed until the whole job keeps it.
+const N_ROUNDS: usize = 4;
+/// By how much more than was missing.
+const NARROWER: f64 = 0.98;
+/// Samples that may be played for one column: some 30 s.
+const N_SAMPLES_MAX: u64 = 40_000_000;
+
+/// Tunes the classic planner's delays: least time on the twin, without mismatch, while errors stay
+/// within the tolerance (`measures.md`, "Classic, tuned").
+///
+/// Light is never shorter than its mark's command, the jump delay is the same after all jumps, and
+/// skywriting waits for no mark delay. For jobs up to half a second no single step of any delay
+/// helps; longer ones are tuned on an excerpt and checked as a whole. What is found is kept in
+/// `options.atlas_store`.
+///
+/// # Errors
+/// As [`crate::mark::mark`] with the classic planner and lag-derived delays.
+pub fn against(
+    job: &Job,
+    machine: &Machine,
+    recipe: &Recipe,
+    options: &MarkOptions,
+    observer: &mut dyn FnMut(Stage),
+) -> Result<Against, Error> {
+    observer(Stage::Tune(0.0));
+    let toolpath = lay_out(job, machine, recipe, options)?.value;
+    let ClassicRecipe { interpolation, acceleration_mm_s2, deceleration_mm_s2, .. } =
+        recipe.classic;
+    let base = ClassicRecipe {
+        interpolation,
+        acceleration_mm_s2,
+        deceleration_mm_s2,
+        ..ClassicRecipe::default()
+    };
+    let settings = Settings::new(machine, &base)?;
+    let plan = classic::plan(toolpath.clone(), machine, &settings, options.tolerance_mm)?;
+    let renderer = Renderer::new(&plan);
+    let setup = Setup { machine, recipe: &base, options, renderer: &renderer };
+    let whole = Bench::new(setup, toolpath)?;
+    let mut warnings = Vec::new();
+    // The lag-derived plan's id stands for job and machine; the twin's noise is not in it.
+    let sensor = &machine.scanner.sensor;
+    let (noise_mm, seed) = (options.noise_mm, options.seed);
+    let id = plan.id();
+    let key = CacheKey::of(&format!("{VERSION} {id} {sensor:?} {noise_mm:?} {seed}"));
+    let file = key.file_name("delays");
+    let names = WAYS.map(|way| way.key);
+    let kept = options.atlas_store.read(&file, "against", &mut warnings, |bytes| {
+        delays_file::read(bytes, key, &names).map_err(|error| error.to_string())
+    });
+    let found = match kept {
+        Some(rows) => rows,
+        None => {
+            let found = tune_all(&whole, &plan, &settings, observer, &mut warnings)?;
+            let rows: Vec<_> = names.into_iter().zip(found.iter().copied()).collect();
+            let text = delays_file::write(key, &rows);
+            options.atlas_store.write(&file, "against", &mut warnings, text.as_bytes());
+            found
+        }
+    };
+    let mut columns = [const { None }; WAYS.len()];
+    for ((way, found), column) in WAYS.iter().zip(found).zip(&mut columns) {
+        let Some(steps) = found else {
+            let message = format!("{}: no delays keep the tolerance", way.name);
+            warnings.push(Warning::new("against", message));
+            continue;
+        };
+        let (settings, plan, score) = whole.play(Delays(steps))?;
+        let times = plan_times(&plan);
+        *column = Some(Column { settings, plan, times, score });
+    }
+    Ok(Against { columns, warnings })
+}
+
+/// What every way finds, on the whole job or on an excerpt.
+fn tune_all(
+    whole: &Bench<'_>,
+    plan: &Plan,
+    settings: &Settings,
+    observer: &mut dyn FnMut(Stage),
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<Option<[i32; delays::N_SETTINGS]>>, Error> {
+    let excerpt = match plan_times(plan).duration_s > WHOLE_MAX_S {
+        true => Some(whole.excerpt(plan, EXCERPT_S)?),
+        false => None,
+    };
+    if let Some(excerpt) = &excerpt {
+        let (n, n_all) = (excerpt.n_marks(), whole.n_marks());
+        let message = format!("delays are tuned on {n} of {n_all} marks, and checked on all");
+        warnings.push(Warning::new("against", message));
+    }
+    let bench = excerpt.as_ref().unwrap_or(whole);
+    let mut n_played_max = 0;
+    let mut found = Vec::new();
+    for (index, way) in WAYS.iter().enumerate() {
+        observer(Stage::Tune(index as f64 / WAYS.len() as f64));
+        n_played_max += (N_SAMPLES_MAX / bench.n_samples(settings)).max(1) as usize;
+        let tuner = Tuner { bench, whole, way, settings, n_played_max };
+        found.push(tuner.run().map(|delays| delays.0));
+    }
+    if bench.n_played() >= n_played_max {
+        let message = "the search was cut short, shorter times may be possible";
+        warnings.push(Warning::new("against", message));
+    }
+    Ok(found)
+}
+
+/// One way's search.
+struct Tuner<'a> {
+    bench: &'a Bench<'a>,
+    whole: &'a Bench<'a>,
+    way: &'a Way,
+    settings: &'a Settings,
+    /// Candidates after which the search ends, all ways before included.
+    n_played_max: usize,
+}
+
+impl Tuner<'_> {
+    /// The best delays that keep the tolerance on the whole job.
+    fn run(&self) -> Option<Delays> {
+        let tolerance_um = 1e3 * self.whole.tolerance_mm();
+        let mut goal = Goal { tolerance_um, coverage: self.way.coverage };
+        let mut starts = Delays::starts(self.settings, self.way.sky);
+        for _ in 0..N_ROUNDS {
+            let (found, rank) = self.tune(&starts, goal);
+            let excess_um = self.whole.rank(found, Goal { tolerance_um, ..goal }).excess_um;
+            if excess_um == 0.0 {
+                return Some(found);
+            }
+            if rank.excess_um > 0.0 {
+                return None;
+            }
+            goal.tolerance_um *= NARROWER * tolerance_um / (tolerance_um + excess_um);
+            starts = vec![found];
+        }
+        None
+    }
+
+    /// The best that is found from any start, and where no single step of any setting helps.
+    fn tune(&self, starts: &[Delays], goal: Goal) -> (Delays, Rank) {
+        let rank = |delays: Delays| self.bench.rank(delays, goal);
+        let spent = || self.bench.n_played() >= self.n_played_max;
+        let settings = Delays::tuned(self.way.sky);
+        let mut best = (starts[0], Rank::NONE);
+        for (index, &start) in starts.iter().enumerate() {
+            // From the generous starts each jump speed is tuned by itself.
+            let settings = if index == 0 { settings } else { &settings[1..] };
+            let found = descend(start, settings, &rank, &spent);
+            if found.1.is_below(&best.1) {
+                best = found;
+            }
+        }
+        descend(best.0, settings, &rank, &spent)
+    }
+}
