@@ -67,13 +67,15 @@ const VERSION: u32 = 1;
 /// Jobs longer than this are tuned on an excerpt, s.
 const WHOLE_MAX_S: f64 = 0.5;
 /// Length of the excerpt, s.
-const EXCERPT_S: f64 = 0.15;
+const EXCERPT_S: f64 = 0.1;
 /// How often the excerpt's tolerance is narrowed until the whole job keeps it.
 const N_ROUNDS: usize = 4;
 /// By how much more than was missing.
 const NARROWER: f64 = 0.98;
-/// Samples that may be played for one column: some 30 s.
-const N_SAMPLES_MAX: u64 = 40_000_000;
+/// Samples that may be played for one column: some 10 s.
+const N_SAMPLES_MAX: u64 = 6_000_000;
+/// Part of them for the first round.
+const FIRST_ROUND: f64 = 0.7;
 
 /// Tunes the classic planner's delays: least time on the twin, without mismatch, while errors stay
 /// within the tolerance (`measures.md`, "Classic, tuned").
@@ -160,15 +162,17 @@ fn tune_all(
         warnings.push(Warning::new("against", message));
     }
     let bench = excerpt.as_ref().unwrap_or(whole);
-    let mut n_played_max = 0;
+    let n_candidates = N_SAMPLES_MAX as f64 / bench.n_samples(settings) as f64;
     let mut found = Vec::new();
+    let mut is_cut = false;
     for (index, way) in WAYS.iter().enumerate() {
         observer(Stage::Tune(index as f64 / WAYS.len() as f64));
-        n_played_max += (N_SAMPLES_MAX / bench.n_samples(settings)).max(1) as usize;
-        let tuner = Tuner { bench, whole, way, settings, n_played_max };
-        found.push(tuner.run().map(|delays| delays.0));
+        let tuner = Tuner { bench, whole, way, settings };
+        let limit = |share: f64| (n_candidates * (index as f64 + share)).ceil() as usize;
+        found.push(tuner.run([limit(FIRST_ROUND), limit(1.0)]).map(|delays| delays.0));
+        is_cut |= bench.n_played() >= limit(FIRST_ROUND);
     }
-    if bench.n_played() >= n_played_max {
+    if is_cut {
         let message = "the search was cut short, shorter times may be possible";
         warnings.push(Warning::new("against", message));
     }
@@ -181,18 +185,22 @@ struct Tuner<'a> {
     whole: &'a Bench<'a>,
     way: &'a Way,
     settings: &'a Settings,
-    /// Candidates after which the search ends, all ways before included.
-    n_played_max: usize,
 }
 
 impl Tuner<'_> {
     /// The best delays that keep the tolerance on the whole job.
-    fn run(&self) -> Option<Delays> {
+    ///
+    /// * `n_played_max`: candidates on the bench, those of other ways too, after which the first
+    ///   round ends, and all do
+    fn run(&self, n_played_max: [usize; 2]) -> Option<Delays> {
         let tolerance_um = 1e3 * self.whole.tolerance_mm();
         let mut goal = Goal { tolerance_um, coverage: self.way.coverage };
-        let mut starts = Delays::starts(self.settings, self.way.sky);
-        for _ in 0..N_ROUNDS {
-            let (found, rank) = self.tune(&starts, goal);
+        let mut starts = Delays::starts(self.settings, self.way.coverage, self.way.sky);
+        if self.bench.n_marks() < self.whole.n_marks() {
+            starts.truncate(1);
+        }
+        for round in 0..N_ROUNDS {
+            let (found, rank) = self.tune(&starts, goal, n_played_max[round.min(1)]);
             let excess_um = self.whole.rank(found, Goal { tolerance_um, ..goal }).excess_um;
             if excess_um == 0.0 {
                 return Some(found);
@@ -207,15 +215,14 @@ impl Tuner<'_> {
     }
 
     /// The best that is found from any start, and where no single step of any setting helps.
-    fn tune(&self, starts: &[Delays], goal: Goal) -> (Delays, Rank) {
+    fn tune(&self, starts: &[Delays], goal: Goal, n_played_max: usize) -> (Delays, Rank) {
         let rank = |delays: Delays| self.bench.rank(delays, goal);
-        let spent = || self.bench.n_played() >= self.n_played_max;
+        let spent = || self.bench.n_played() >= n_played_max;
         let settings = Delays::tuned(self.way.sky);
         let mut best = (starts[0], Rank::NONE);
-        for (index, &start) in starts.iter().enumerate() {
-            // From the generous starts each jump speed is tuned by itself.
-            let settings = if index == 0 { settings } else { &settings[1..] };
-            let found = descend(start, settings, &rank, &spent);
+        for &start in starts {
+            // Its jump speed first keeps to itself: a faster one needs longer delays to be better.
+            let found = descend(start, &settings[1..], &rank, &spent);
             if found.1.is_below(&best.1) {
                 best = found;
             }

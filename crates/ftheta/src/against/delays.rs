@@ -23,10 +23,12 @@ const LASER_OFF: usize = 5;
 const RUN_IN: usize = 6;
 const RUN_OUT: usize = 7;
 
-/// Position of the slowest jump speed that is worth a start of its own.
-const FAST: i32 = 2;
+/// Positions of the jump speeds that are worth a start of their own.
+const STARTS: [i32; 2] = [3, 4];
 /// How many times what the lag suggests is enough for nearly any job.
 const GENEROUS: i32 = 3;
+/// Lags by which light is longer at a mark's start and end where those have to be reached.
+const LONGER: [f64; 2] = [0.4, 0.9];
 
 /// Index of the jump speed; jump, mark and polygon delay in 10 µs; laser-on and laser-off delay in
 /// 1 µs; run-in and run-out in 10 µs.
@@ -34,21 +36,28 @@ const GENEROUS: i32 = 3;
 pub struct Delays(pub [i32; N_SETTINGS]);
 
 impl Delays {
-    /// The steps nearest to lag-derived settings, and generous ones at the faster jump speeds.
+    /// Generous settings at the faster jump speeds, the usual one first, and the lag-derived ones.
     ///
-    /// The first may keep no tolerance; from there what is found depends on what is mended first.
-    pub fn starts(settings: &Settings, sky: bool) -> Vec<Self> {
+    /// From where the tolerance is kept only time is to be saved, which takes the fewest steps.
+    ///
+    /// * `coverage`: whether ends and corners have to be reached, which takes light that is longer
+    ///   at both ends, unless they are passed at full speed
+    pub fn starts(settings: &Settings, coverage: bool, sky: bool) -> Vec<Self> {
         let derived = Self::near(settings, sky);
         let mut generous = derived;
+        if coverage && !sky {
+            let lag_us = 1e6 * settings.polygon_delay_s;
+            generous.0[LASER_ON] -= (LONGER[0] * lag_us) as i32;
+            generous.0[LASER_OFF] += (LONGER[1] * lag_us) as i32;
+        }
         let waits = if sky { RUN_IN..=RUN_OUT } else { JUMP..=POLYGON };
         waits.for_each(|setting| generous.0[setting] *= GENEROUS);
-        let speeds = FAST..JUMP_SPEEDS_MM_S.len() as i32;
-        let at_speed = speeds.map(|speed| {
+        let starts = STARTS.map(|speed| {
             let mut delays = generous;
             delays.0[JUMP_SPEED] = speed;
             delays
         });
-        std::iter::once(derived).chain(at_speed).collect()
+        starts.into_iter().chain([derived]).collect()
     }
 
     /// * `sky`: with runs of two lags before and one after every leg, the jump delay at 0

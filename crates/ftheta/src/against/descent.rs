@@ -82,3 +82,38 @@ fn both(
         [first.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), second]
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time is least at (40, 7) on a slope with a wall: the sum must not be less than 60.
+    fn rank(delays: Delays) -> Rank {
+        let [_, jump, mark, ..] = delays.0;
+        Rank {
+            excess_um: f64::from((60 - jump - mark).max(0)),
+            duration_s: f64::from(2 * (jump - 40).abs() + (mark - 7).abs()),
+        }
+    }
+
+    #[test]
+    fn no_single_step_helps_where_it_ends() {
+        for start in [[0; 8], [2, 500, 300, 0, 0, 0, 0, 0], [0, 60, 0, 0, 0, 0, 0, 0]] {
+            let settings = [1, 2];
+            let (found, best) = descend(Delays(start), &settings, &rank, &|| false);
+            assert_eq!(best.excess_um, 0.0);
+            for setting in settings {
+                for steps in [-1, 1] {
+                    let near = found.moved(setting, steps).map(rank);
+                    assert!(near.is_none_or(|near| !near.is_below(&best)), "{found:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_tried_once_it_is_spent() {
+        let start = Delays([0; 8]);
+        assert_eq!(descend(start, &[1, 2], &rank, &|| true), (start, rank(start)));
+    }
+}
