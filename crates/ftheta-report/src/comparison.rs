@@ -15,8 +15,11 @@ pub struct Rival<'a> {
     pub settings: Vec<(String, String)>,
 }
 
-/// What is compared, with its unit, and where it comes from.
-const ROWS: [(&str, fn(&Score) -> Option<f64>); 9] = [
+/// A figure of a score, if it has it.
+type Figure = fn(&Score) -> Option<f64>;
+
+/// What is compared, with its unit.
+const ROWS: [(&str, Figure); 9] = [
     ("Marking time, ms", |score| Some(1e3 * score.duration_s)),
     ("Contour error, max, µm", |score| Some(score.contour_error_um.max)),
     ("Contour error, rms, µm", |score| Some(score.contour_error_um.rms)),

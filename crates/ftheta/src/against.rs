@@ -1,4 +1,4 @@
-//! The same job by the classic planner with its delays tuned: what other planners are compared with.
+//! The same job by the classic planner with tuned delays: what other planners are compared with.
 
 mod bench;
 mod delays;
@@ -8,7 +8,7 @@ mod excerpt;
 use crate::Error;
 use crate::mark::{MarkOptions, PlanTimes, Stage, lay_out, plan_times};
 use bench::{Bench, Goal, Setup};
-use delays::Delays;
+use delays::{Delays, N_SETTINGS};
 use descent::{Rank, descend};
 use ftheta_formats::cache_key::CacheKey;
 use ftheta_formats::delays_file;
@@ -20,6 +20,7 @@ use ftheta_physics::plan::Plan;
 use ftheta_planner::classic::{self, Settings};
 use ftheta_planner::render::Renderer;
 use ftheta_report::score::Score;
+use ftheta_twin::mismatch::Mismatch;
 
 /// A way to tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,14 +66,14 @@ pub struct Column {
 /// To be raised when the same job and machine would be tuned differently.
 const VERSION: u32 = 1;
 /// Jobs longer than this are tuned on an excerpt, s.
-const WHOLE_MAX_S: f64 = 0.5;
+const WHOLE_MAX_S: f64 = 0.25;
 /// Length of the excerpt, s.
 const EXCERPT_S: f64 = 0.1;
 /// How often the excerpt's tolerance is narrowed until the whole job keeps it.
 const N_ROUNDS: usize = 4;
 /// By how much more than was missing.
 const NARROWER: f64 = 0.98;
-/// Samples that may be played for one column: some 10 s.
+/// Samples of an excerpt that may be played for one way: some 10 s.
 const N_SAMPLES_MAX: u64 = 6_000_000;
 /// Part of them for the first round.
 const FIRST_ROUND: f64 = 0.7;
@@ -81,9 +82,11 @@ const FIRST_ROUND: f64 = 0.7;
 /// within the tolerance (`measures.md`, "Classic, tuned").
 ///
 /// Light is never shorter than its mark's command, the jump delay is the same after all jumps, and
-/// skywriting waits for no mark delay. For jobs up to half a second no single step of any delay
-/// helps; longer ones are tuned on an excerpt and checked as a whole. What is found is kept in
-/// `options.atlas_store`.
+/// skywriting waits for no mark delay. What is found is kept in `options.atlas_store`.
+///
+/// # Accuracy
+/// For jobs up to a quarter of a second no single step of any delay helps. Longer ones are tuned on
+/// an excerpt and checked as a whole, with a warning.
 ///
 /// # Errors
 /// As [`crate::mark::mark`] with the classic planner and lag-derived delays.
@@ -96,12 +99,11 @@ pub fn against(
 ) -> Result<Against, Error> {
     observer(Stage::Tune(0.0));
     let toolpath = lay_out(job, machine, recipe, options)?.value;
-    let ClassicRecipe { interpolation, acceleration_mm_s2, deceleration_mm_s2, .. } =
-        recipe.classic;
+    // All that is tuned starts from what follows from the lag.
     let base = ClassicRecipe {
-        interpolation,
-        acceleration_mm_s2,
-        deceleration_mm_s2,
+        interpolation: recipe.classic.interpolation,
+        acceleration_mm_s2: recipe.classic.acceleration_mm_s2,
+        deceleration_mm_s2: recipe.classic.deceleration_mm_s2,
         ..ClassicRecipe::default()
     };
     let settings = Settings::new(machine, &base)?;
@@ -110,26 +112,18 @@ pub fn against(
     let setup = Setup { machine, recipe: &base, options, renderer: &renderer };
     let whole = Bench::new(setup, toolpath)?;
     let mut warnings = Vec::new();
-    // The lag-derived plan's id stands for job and machine; the twin's noise is not in it.
-    let sensor = &machine.scanner.sensor;
-    let (noise_mm, seed) = (options.noise_mm, options.seed);
-    let id = plan.id();
-    let key = CacheKey::of(&format!("{VERSION} {id} {sensor:?} {noise_mm:?} {seed}"));
-    let file = key.file_name("delays");
-    let names = WAYS.map(|way| way.key);
-    let kept = options.atlas_store.read(&file, "against", &mut warnings, |bytes| {
-        delays_file::read(bytes, key, &names).map_err(|error| error.to_string())
-    });
-    let found = match kept {
-        Some(rows) => rows,
-        None => {
-            let found = tune_all(&whole, &plan, &settings, observer, &mut warnings)?;
-            let rows: Vec<_> = names.into_iter().zip(found.iter().copied()).collect();
-            let text = delays_file::write(key, &rows);
-            options.atlas_store.write(&file, "against", &mut warnings, text.as_bytes());
-            found
-        }
-    };
+    if options.mismatch != Mismatch::default() {
+        let message = "the classic planner's plans are played without the mismatch";
+        warnings.push(Warning::new("against", message));
+    }
+    if is_long(&plan) {
+        let message = "delays are tuned on an excerpt of the job and checked on all of it: shorter \
+                       times may be possible";
+        warnings.push(Warning::new("against", message));
+    }
+    let found = kept_or(machine, options, &plan, &mut warnings, || {
+        tune_all(&whole, &plan, &settings, observer)
+    })?;
     let mut columns = [const { None }; WAYS.len()];
     for ((way, found), column) in WAYS.iter().zip(found).zip(&mut columns) {
         let Some(steps) = found else {
@@ -144,39 +138,64 @@ pub fn against(
     Ok(Against { columns, warnings })
 }
 
+/// For every way its delays, or `None` where none keep the tolerance.
+type Found = Vec<Option<[i32; N_SETTINGS]>>;
+
+/// What was kept from an earlier run, or else what `tune` finds, which is kept.
+///
+/// * `plan` with lag-derived delays: its id stands for job and machine
+fn kept_or(
+    machine: &Machine,
+    options: &MarkOptions,
+    plan: &Plan,
+    warnings: &mut Vec<Warning>,
+    tune: impl FnOnce() -> Result<Found, Error>,
+) -> Result<Found, Error> {
+    let MarkOptions { noise_mm, seed, atlas_store: store, .. } = options;
+    // What the twin adds to the plan is not in its id.
+    let sensor = &machine.scanner.sensor;
+    let key = CacheKey::of(&format!("{VERSION} {} {sensor:?} {noise_mm:?} {seed}", plan.id()));
+    let file = key.file_name("delays");
+    let names = WAYS.map(|way| way.key);
+    let kept = store.read(&file, "against", warnings, |bytes| {
+        delays_file::read(bytes, key, &names).map_err(|error| error.to_string())
+    });
+    if let Some(found) = kept {
+        return Ok(found);
+    }
+    let found = tune()?;
+    let rows: Vec<_> = names.into_iter().zip(found.iter().copied()).collect();
+    store.write(&file, "against", warnings, delays_file::write(key, &rows).as_bytes());
+    Ok(found)
+}
+
 /// What every way finds, on the whole job or on an excerpt.
 fn tune_all(
     whole: &Bench<'_>,
     plan: &Plan,
     settings: &Settings,
     observer: &mut dyn FnMut(Stage),
-    warnings: &mut Vec<Warning>,
-) -> Result<Vec<Option<[i32; delays::N_SETTINGS]>>, Error> {
-    let excerpt = match plan_times(plan).duration_s > WHOLE_MAX_S {
-        true => Some(whole.excerpt(plan, EXCERPT_S)?),
-        false => None,
-    };
-    if let Some(excerpt) = &excerpt {
-        let (n, n_all) = (excerpt.n_marks(), whole.n_marks());
-        let message = format!("delays are tuned on {n} of {n_all} marks, and checked on all");
-        warnings.push(Warning::new("against", message));
-    }
+) -> Result<Found, Error> {
+    let excerpt = is_long(plan).then(|| whole.excerpt(plan, EXCERPT_S)).transpose()?;
     let bench = excerpt.as_ref().unwrap_or(whole);
-    let n_candidates = N_SAMPLES_MAX as f64 / bench.n_samples(settings) as f64;
+    // A short job is tuned to the end.
+    let n_candidates = match excerpt {
+        Some(_) => N_SAMPLES_MAX as f64 / bench.n_samples(settings) as f64,
+        None => f64::INFINITY,
+    };
     let mut found = Vec::new();
-    let mut is_cut = false;
     for (index, way) in WAYS.iter().enumerate() {
         observer(Stage::Tune(index as f64 / WAYS.len() as f64));
         let tuner = Tuner { bench, whole, way, settings };
-        let limit = |share: f64| (n_candidates * (index as f64 + share)).ceil() as usize;
+        let limit = |share: f64| (n_candidates * (index as f64 + share)) as usize;
         found.push(tuner.run([limit(FIRST_ROUND), limit(1.0)]).map(|delays| delays.0));
-        is_cut |= bench.n_played() >= limit(FIRST_ROUND);
-    }
-    if is_cut {
-        let message = "the search was cut short, shorter times may be possible";
-        warnings.push(Warning::new("against", message));
     }
     Ok(found)
+}
+
+/// Whether an excerpt stands for the job while its delays are tuned.
+fn is_long(plan: &Plan) -> bool {
+    plan_times(plan).duration_s > WHOLE_MAX_S
 }
 
 /// One way's search.

@@ -89,8 +89,8 @@ impl Settings {
     }
 
     /// Whether every leg between corners is a mark of its own, at full speed from end to end: the
-    /// beam runs in and out beside it, and jumps from one to the next. Then no mark or polygon delay
-    /// is waited for, micro-steps are absolute, and there are no ramps.
+    /// beam runs in and out beside it, and jumps from one to the next. Then no mark or polygon
+    /// delay is waited for, micro-steps are absolute, and there are no ramps.
     pub fn skywriting(&self) -> bool {
         self.sky_run_in_s > 0.0 || self.sky_run_out_s > 0.0
     }

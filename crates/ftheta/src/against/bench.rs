@@ -15,7 +15,7 @@ use ftheta_report::score::Score;
 use ftheta_twin::mismatch::Mismatch;
 use ftheta_twin::twin::{Twin, TwinOptions};
 use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The lag-derived start is rounded to whole steps at both edges, µs.
 const LIGHT_ROUNDING_US: f64 = 1.0;
@@ -79,6 +79,7 @@ impl<'a> Bench<'a> {
         Self::new(self.setup, excerpt(&self.toolpath, &score, time_s))
     }
 
+    /// Number of its marks.
     pub fn n_marks(&self) -> usize {
         self.toolpath.marks.len()
     }
@@ -117,23 +118,7 @@ impl<'a> Bench<'a> {
         if delays.light_missing_us(&self.setup.machine.laser) > LIGHT_ROUNDING_US {
             return Rank::NONE;
         }
-        let known = |value: Option<Option<Figures>>| {
-            let mut known = self.known.lock().unwrap_or_else(|poison| poison.into_inner());
-            match value {
-                Some(figures) => known.insert(delays, figures).or(Some(figures)),
-                None => known.get(&delays).copied(),
-            }
-        };
-        let figures = known(None).unwrap_or_else(|| {
-            let figures = self.play(delays).ok().map(|(_, _, score)| Figures {
-                duration_s: score.duration_s,
-                contour_um: score.contour_error_um.max,
-                coverage_um: score.coverage_error_um.max,
-            });
-            known(Some(figures));
-            figures
-        });
-        figures.map_or(Rank::NONE, |figures| {
+        self.figures(delays).map_or(Rank::NONE, |figures| {
             let coverage_um = if goal.coverage { figures.coverage_um } else { 0.0 };
             let error_um = figures.contour_um.max(coverage_um);
             let excess_um = (error_um - goal.tolerance_um).max(0.0);
@@ -141,8 +126,26 @@ impl<'a> Bench<'a> {
         })
     }
 
+    fn figures(&self, delays: Delays) -> Option<Figures> {
+        if let Some(&known) = self.known().get(&delays) {
+            return known;
+        }
+        let figures = self.play(delays).ok().map(|(_, _, score)| Figures {
+            duration_s: score.duration_s,
+            contour_um: score.contour_error_um.max,
+            coverage_um: score.coverage_error_um.max,
+        });
+        self.known().insert(delays, figures);
+        figures
+    }
+
     /// How many candidates were played.
     pub fn n_played(&self) -> usize {
-        self.known.lock().map_or(0, |known| known.len())
+        self.known().len()
+    }
+
+    fn known(&self) -> MutexGuard<'_, BTreeMap<Delays, Option<Figures>>> {
+        // Every entry is whole, whoever panicked.
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
