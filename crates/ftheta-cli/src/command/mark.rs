@@ -94,7 +94,7 @@ fn note_delays(against: &Against) {
 fn print_against(against: &Against, duration_s: f64) {
     for (way, column) in WAYS.iter().zip(&against.columns) {
         let Some(Column { score, .. }) = column else {
-            say!("against  {:12} keeps no tolerance", way.name);
+            say!("against  {:12} no delays keep the tolerance", way.name);
             continue;
         };
         say!(

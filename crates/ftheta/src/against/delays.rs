@@ -60,13 +60,15 @@ impl Delays {
         starts.into_iter().chain([derived]).collect()
     }
 
+    /// The steps nearest to lag-derived settings.
+    ///
     /// * `sky`: with runs of two lags before and one after every leg, the jump delay at 0
     fn near(settings: &Settings, sky: bool) -> Self {
         let steps = |time_s: f64| (time_s / STEP_S).round() as i32;
         let laser = |time_ns: i64| (time_ns as f64 / LASER_STEP_NS as f64).round() as i32;
         let apart = |speed_mm_s: f64| (speed_mm_s / settings.jump_speed_mm_s).ln().abs();
-        let fastest = JUMP_SPEEDS_MM_S.iter().enumerate();
-        let speed = fastest.min_by(|a, b| apart(*a.1).total_cmp(&apart(*b.1)));
+        let speeds = JUMP_SPEEDS_MM_S.iter().enumerate();
+        let speed = speeds.min_by(|a, b| apart(*a.1).total_cmp(&apart(*b.1)));
         // Lag-derived, the jump delay is two lags and the polygon delay one.
         let (lag, lags) = (steps(settings.polygon_delay_s), steps(settings.jump_delay_s));
         let [jump, mark, run_in, run_out] =
@@ -98,6 +100,8 @@ impl Delays {
         let within = match setting {
             JUMP_SPEED => (0..JUMP_SPEEDS_MM_S.len() as i32).contains(&value),
             LASER_ON | LASER_OFF => true,
+            // Without any run it would be no skywriting.
+            RUN_IN => value > 0,
             _ => value >= 0,
         };
         self.0[setting] = value;
