@@ -159,12 +159,16 @@ pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
     let gains = Gains::design(scanner, tick_s)?;
     let invertible = gains.reference_rad(&State::zeros(), 0.0, 0.0).is_some();
     let inverse = Inverse::new(&galvo, &gains, tick_s);
-    structure::check_structure(draft, invertible && inverse.is_some())?;
-    light::check_light(draft, gains.lag_s(&galvo))?;
-    let mut walk = Walk::new(draft, gains, inverse.as_ref());
+    structure::check_structure(draft)?;
+    let by_voltage = invertible && draft.machine.output.drive != Drive::BlackBox;
+    if by_voltage && inverse.is_none() {
+        let what = "no voltage moves its mirrors".into();
+        return Err(AuditError::Malformed { place: "the machine".into(), what });
+    }
+    light::check_light(draft, gains.lag_s(&galvo), by_voltage)?;
+    let mut walk = Walk::new(draft, gains, inverse.as_ref(), by_voltage);
     let mut meter = Meter::new(draft, gains);
-    let known = invertible && draft.machine.output.drive != Drive::BlackBox;
-    let mut beam = Beam::new(draft, known);
+    let mut beam = Beam::new(draft, by_voltage);
     let period_ns = f64::from(draft.machine.output.period_ns);
     let gap_max_rad = draft.tolerance_mm / scale_mm_per_rad(&draft.machine.optics);
     while let Some((command, segment_index)) = walk.next() {
