@@ -4,6 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use ftheta::jump::{Law, LawError};
 use ftheta::model::plan::Planner;
+use ftheta::planner::optimal::Corner;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
 use std::ops::RangeInclusive;
@@ -65,6 +66,10 @@ pub struct Mark {
     /// How the motion is planned; without it the best that the machine's drive allows.
     #[arg(long, value_enum)]
     pub planner: Option<PlannerName>,
+
+    /// How planned marks take corners; chosen for each one if not given.
+    #[arg(long, value_enum)]
+    pub corner: Option<CornerName>,
     /// Part of the voltage that planned jumps keep for the servo's feedback, 0 to 0.9.
     #[arg(long, value_name = "R", default_value = "0.12", value_parser = reserve)]
     pub reserve: f64,
@@ -227,7 +232,7 @@ pub struct Mechanism {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub enum PlannerName {
-    /// Jumps at the limit of motors and resonance; marks as the classic planner's.
+    /// Marks at constant dose, between them the fastest motion that motors and resonance allow.
     Optimal,
     /// What RTC- and EZCAD-type controllers do: constant speed and delays.
     Classic,
@@ -340,6 +345,27 @@ mod tests {
             ("kt=0.6", "kt = 0.6 is outside -0.5 to 0.5"),
         ] {
             assert_eq!(mismatch(text).unwrap_err(), expected);
+        }
+    }
+}
+
+/// How corners are taken.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum CornerName {
+    /// Stop in the corner; power follows the speed.
+    Exact,
+    /// Stay within the tolerance without a stop; power follows the speed.
+    Blend,
+    /// Run out, turn with the laser off, run in at mark speed.
+    Sky,
+}
+
+impl From<CornerName> for Corner {
+    fn from(name: CornerName) -> Self {
+        match name {
+            CornerName::Exact => Self::Exact,
+            CornerName::Blend => Self::Blend,
+            CornerName::Sky => Self::Sky,
         }
     }
 }

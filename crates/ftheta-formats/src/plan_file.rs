@@ -3,14 +3,17 @@
 
 use crate::machine;
 use crate::toml_table::TomlError;
-use ftheta_model::plan::{Motion, PlanDraft, PlannedMark, Planner, Segment, SpeedProfile};
+use ftheta_model::block::LaserEdge;
+use ftheta_model::plan::{
+    Knot, Motion, PlanDraft, PlannedMark, Planner, Segment, SpeedProfile, Station,
+};
 use ftheta_model::recipe::{Interpolation, Pen};
-use kurbo::{BezPath, Point};
+use kurbo::{BezPath, Point, Vec2};
 use std::io::{self, Write};
 use std::str::{FromStr, SplitWhitespace};
 use thiserror::Error;
 
-const HEADER: &str = "ftheta-plan 2";
+const HEADER: &str = "ftheta-plan 3";
 
 /// What is wrong with a plan file.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -59,18 +62,29 @@ pub fn write(draft: &PlanDraft, id: &str, out: &mut impl Write) -> io::Result<()
     }
     writeln!(out, "marks {}", draft.marks.len())?;
     for mark in &draft.marks {
-        let PlannedMark { curve, pen_index, source, on_ns, off_ns, power_w } = mark;
+        let PlannedMark { curve, pen_index, source, on_ns, off_ns, power_w, steps } = mark;
         writeln!(out, "{pen_index} {on_ns} {off_ns} {power_w} {}", one_line(source))?;
         writeln!(out, "{}", curve.to_svg())?;
+        writeln!(out, "steps {}", steps.len())?;
+        for step in steps {
+            writeln!(out, "{} {}", step.time_ns, step.power_w)?;
+        }
     }
     writeln!(out, "vertices {}", draft.vertices.len())?;
     for vertex in &draft.vertices {
         writeln!(out, "{} {}", vertex.x, vertex.y)?;
     }
-    writeln!(out, "sequences {}", draft.sequences_v.len())?;
-    for sequence_v in &draft.sequences_v {
-        let volts: Vec<String> = sequence_v.iter().map(f64::to_string).collect();
-        writeln!(out, "{}", volts.join(" "))?;
+    writeln!(out, "stations {}", draft.stations.len())?;
+    for Station { arriving: a, leaving: b, distance_mm } in &draft.stations {
+        writeln!(out, "{} {} {} {} {distance_mm}", a.x, a.y, b.x, b.y)?;
+    }
+    writeln!(out, "knots {}", draft.knots.len())?;
+    for Knot { time_s, distance_mm, speed_mm_s } in &draft.knots {
+        writeln!(out, "{time_s} {distance_mm} {speed_mm_s}")?;
+    }
+    writeln!(out, "drives {}", draft.drives.len())?;
+    for [x, y] in &draft.drives {
+        writeln!(out, "{x} {y}")?;
     }
     writeln!(out, "segments {}", draft.segments.len())?;
     for segment in &draft.segments {
@@ -91,8 +105,21 @@ fn write_segment(segment: &Segment, out: &mut impl Write) -> io::Result<()> {
     }
     match segment.motion {
         Motion::Hold { vertex } => writeln!(out, "hold {vertex}"),
-        Motion::Jump { from_vertex, to_vertex, sequence } => {
-            writeln!(out, "jump {from_vertex} {to_vertex} {sequence}")
+        Motion::Drive { first } => writeln!(out, "drive {first}"),
+        Motion::Track {
+            first_vertex,
+            n_vertices,
+            first_station,
+            first_knot,
+            n_knots,
+            smoothing_ticks,
+        } => {
+            let station = first_station.map_or("-".into(), |first| first.to_string());
+            writeln!(
+                out,
+                "track {first_vertex} {n_vertices} {station} {first_knot} {n_knots} \
+                 {smoothing_ticks}"
+            )
         }
         Motion::Travel { first_vertex, n_vertices, profile: p, interpolation } => {
             let kind = match interpolation {
@@ -116,7 +143,7 @@ pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
     let mut lines = Lines { lines: text.lines(), number: 0 };
     let header = lines.next("the header of a plan file")?;
     if header != HEADER {
-        return Err(lines.error("\"ftheta-plan 2\"", header));
+        return Err(lines.error("\"ftheta-plan 3\"", header));
     }
     let id = lines.after("id")?.to_owned();
     let planner = match lines.after("planner")? {
@@ -140,7 +167,9 @@ pub fn read(text: &str) -> Result<(PlanDraft, String), PlanFileError> {
         pens: lines.table("pens", read_pen)?,
         marks: lines.table("marks", read_mark)?,
         vertices: lines.table("vertices", read_vertex)?,
-        sequences_v: lines.table("sequences", read_sequence)?,
+        stations: lines.table("stations", read_station)?,
+        knots: lines.table("knots", read_knot)?,
+        drives: lines.table("drives", read_drive)?,
         segments: lines.table("segments", read_segment)?,
     };
     let last = lines.next("the last line, \"end\"")?;
@@ -181,7 +210,16 @@ fn read_mark(lines: &mut Lines<'_>) -> Result<PlannedMark, PlanFileError> {
     if curve.elements().len() < 2 || !curve.is_finite() {
         return Err(lines.error("a finite curve", path));
     }
-    Ok(PlannedMark { curve, pen_index, source: source.into(), on_ns, off_ns, power_w })
+    let steps = lines.table("steps", read_step)?;
+    Ok(PlannedMark { curve, pen_index, source: source.into(), on_ns, off_ns, power_w, steps })
+}
+
+fn read_step(lines: &mut Lines<'_>) -> Result<LaserEdge, PlanFileError> {
+    let line = lines.next("a change of power")?;
+    let mut fields = line.split_whitespace();
+    let time_ns = lines.field(&mut fields, "a time in ns")?;
+    let power_w = lines.field(&mut fields, "a power in W")?;
+    Ok(LaserEdge { time_ns, power_w })
 }
 
 fn read_vertex(lines: &mut Lines<'_>) -> Result<Point, PlanFileError> {
@@ -192,9 +230,33 @@ fn read_vertex(lines: &mut Lines<'_>) -> Result<Point, PlanFileError> {
     Ok(Point::new(x, y))
 }
 
-fn read_sequence(lines: &mut Lines<'_>) -> Result<Vec<f64>, PlanFileError> {
-    let line = lines.next("a sequence of voltages")?;
-    line.split_whitespace().map(|field| lines.parse(field, "a voltage in V")).collect()
+fn read_station(lines: &mut Lines<'_>) -> Result<Station, PlanFileError> {
+    let line = lines.next("a station")?;
+    let mut fields = line.split_whitespace();
+    let mut direction = || -> Result<Vec2, PlanFileError> {
+        let x = lines.field(&mut fields, "x of a direction")?;
+        Ok(Vec2::new(x, lines.field(&mut fields, "y of a direction")?))
+    };
+    let (arriving, leaving) = (direction()?, direction()?);
+    let distance_mm = lines.field(&mut fields, "an arc length in mm")?;
+    Ok(Station { arriving, leaving, distance_mm })
+}
+
+fn read_knot(lines: &mut Lines<'_>) -> Result<Knot, PlanFileError> {
+    let line = lines.next("a knot")?;
+    let mut fields = line.split_whitespace();
+    Ok(Knot {
+        time_s: lines.field(&mut fields, "a time in s")?,
+        distance_mm: lines.field(&mut fields, "an arc length in mm")?,
+        speed_mm_s: lines.field(&mut fields, "a speed in mm/s")?,
+    })
+}
+
+fn read_drive(lines: &mut Lines<'_>) -> Result<[f32; 2], PlanFileError> {
+    let line = lines.next("a drive")?;
+    let mut fields = line.split_whitespace();
+    let x = lines.field(&mut fields, "what drives x")?;
+    Ok([x, lines.field(&mut fields, "what drives y")?])
 }
 
 fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
@@ -211,17 +273,17 @@ fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
             let vertex = lines.field(&mut fields, "a vertex")?;
             return Ok(Segment { mark_index, n_ticks, motion: Motion::Hold { vertex } });
         }
-        "jump" => {
-            let motion = Motion::Jump {
-                from_vertex: lines.field(&mut fields, "a vertex")?,
-                to_vertex: lines.field(&mut fields, "a vertex")?,
-                sequence: lines.field(&mut fields, "a sequence's index")?,
-            };
+        "drive" => {
+            let first = lines.field(&mut fields, "a drive's index")?;
+            return Ok(Segment { mark_index, n_ticks, motion: Motion::Drive { first } });
+        }
+        "track" => {
+            let motion = read_track(lines, &mut fields)?;
             return Ok(Segment { mark_index, n_ticks, motion });
         }
         "travel" => Interpolation::Absolute,
         "dda" => Interpolation::Dda,
-        other => return Err(lines.error("hold, travel, dda or jump", other)),
+        other => return Err(lines.error("hold, travel, dda, track or drive", other)),
     };
     let motion = Motion::Travel {
         first_vertex: lines.field(&mut fields, "a vertex")?,
@@ -235,6 +297,26 @@ fn read_segment(lines: &mut Lines<'_>) -> Result<Segment, PlanFileError> {
         interpolation,
     };
     Ok(Segment { mark_index, n_ticks, motion })
+}
+
+fn read_track(
+    lines: &mut Lines<'_>,
+    fields: &mut SplitWhitespace<'_>,
+) -> Result<Motion, PlanFileError> {
+    let first_vertex = lines.field(fields, "a vertex")?;
+    let n_vertices = lines.field(fields, "a number of vertices")?;
+    let first_station = match fields.next().unwrap_or_default() {
+        "-" => None,
+        index => Some(lines.parse(index, "a station or -")?),
+    };
+    Ok(Motion::Track {
+        first_vertex,
+        n_vertices,
+        first_station,
+        first_knot: lines.field(fields, "a knot")?,
+        n_knots: lines.field(fields, "a number of knots")?,
+        smoothing_ticks: lines.field(fields, "a number of ticks")?,
+    })
 }
 
 /// The lines of the file, counted.

@@ -1,8 +1,9 @@
 //! A plan's content: motion and laser edges on one tick grid, before it is audited.
 
+use crate::block::LaserEdge;
 use crate::machine::Machine;
 use crate::recipe::{Interpolation, Pen};
-use kurbo::{BezPath, Point};
+use kurbo::{BezPath, Point, Vec2};
 
 /// The content of a plan. Only the audit in `ftheta-physics` turns it into a `Plan` to be played.
 #[derive(Clone, Debug)]
@@ -19,8 +20,13 @@ pub struct PlanDraft {
     pub marks: Vec<PlannedMark>,
     /// Vertices of all paths, field mm; segments refer to ranges of it.
     pub vertices: Vec<Point>,
-    /// Voltages that planned jumps are scaled from, V, one per tick; jumps refer to them by index.
-    pub sequences_v: Vec<Vec<f64>>,
+    /// Direction and arc length at vertices of curved tracks; tracks refer to ranges of it.
+    pub stations: Vec<Station>,
+    /// Speed over time along tracks; tracks refer to ranges of it.
+    pub knots: Vec<Knot>,
+    /// What both axes are driven by, a pair per tick: volts, or angles in rad on a machine of which
+    /// only the lag is known. Drives refer to ranges of it.
+    pub drives: Vec<[f32; 2]>,
     /// Motion from the first sample on, without a gap.
     pub segments: Vec<Segment>,
 }
@@ -30,7 +36,7 @@ pub struct PlanDraft {
 pub enum Planner {
     /// What RTC- and EZCAD-type controllers do.
     Classic,
-    /// Jumps at the limit of motors and resonance.
+    /// Marks at constant dose, between them the fastest motion that motors and resonance allow.
     Optimal,
 }
 
@@ -57,8 +63,36 @@ pub struct PlannedMark {
     pub on_ns: u64,
     /// Signal edge that switches the laser off, ns.
     pub off_ns: u64,
-    /// Power between the edges, W.
+    /// Power from the on edge, W.
     pub power_w: f64,
+    /// Later changes of power, in order, all between the edges and none of them to zero.
+    pub steps: Vec<LaserEdge>,
+}
+
+/// Direction and arc length at a vertex of a curve.
+///
+/// Between two of them the path is the cubic with these ends, directions and length: of an arc of
+/// 10 degrees it is off by 1e-6 of the radius.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// Direction in which the path comes, length 1.
+    pub arriving: Vec2,
+    /// Direction in which it goes on, length 1; another one in a corner.
+    pub leaving: Vec2,
+    /// Arc length from the track's first vertex, mm.
+    pub distance_mm: f64,
+}
+
+/// A point of a speed profile; between two of them the acceleration is constant, before the first
+/// and after the last the speed is. Two at the same time are a change of speed at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Knot {
+    /// Time from the track's beginning, s.
+    pub time_s: f64,
+    /// Arc length from the track's first vertex, mm.
+    pub distance_mm: f64,
+    /// Speed, mm/s.
+    pub speed_mm_s: f64,
 }
 
 /// A stretch of motion.
@@ -92,16 +126,32 @@ pub enum Motion {
         /// How samples are computed.
         interpolation: Interpolation,
     },
-    /// Goes from rest to rest by voltages, the same sequence on both axes, each with the factor
-    /// that takes it from angle to angle. Sample j (from 1) is the reference for which the nominal
-    /// servo applies voltage j of the sequence in the tick that follows.
-    Jump {
-        /// Index of the vertex it starts on.
-        from_vertex: u32,
-        /// Index of the vertex it ends on.
-        to_vertex: u32,
-        /// Index into [`PlanDraft::sequences_v`]; as many voltages as the segment has samples.
-        sequence: u32,
+    /// Follows vertices, straight on past both ends. The place is averaged three times over
+    /// `smoothing_ticks` ticks, so that speed and direction never change at once; then comes the
+    /// command by which the nominal servo takes the mirror there, exactly at polynomials.
+    ///
+    /// Sample j (from 1) commands the voltage that acts between ticks j - 1 and j of the profile.
+    /// Where the servo is not known, sample j is the angle itself at tick j of the profile.
+    Track {
+        /// Index of the first vertex.
+        first_vertex: u32,
+        /// Number of vertices, two or more.
+        n_vertices: u32,
+        /// Index of the first of as many stations as vertices, if the path is curved.
+        first_station: Option<u32>,
+        /// Index of the first knot.
+        first_knot: u32,
+        /// Number of knots, one or more.
+        n_knots: u32,
+        /// Ticks of each of three averages; 1 averages nothing.
+        smoothing_ticks: u32,
+    },
+    /// Goes on from the state that the motion before has left, by voltages as they are: sample j
+    /// (from 1) is the reference for which the nominal servo applies voltage j in the tick that
+    /// follows. Where the servo is not known, the samples are the angles themselves.
+    Drive {
+        /// Index of the first of as many pairs as there are samples.
+        first: u32,
     },
 }
 
@@ -123,26 +173,35 @@ impl PlanDraft {
     pub fn n_samples(&self) -> u64 {
         self.segments.iter().map(|segment| u64::from(segment.n_ticks)).sum()
     }
+
+    /// Arc length of a track, mm; zero for other motion.
+    pub fn track_length_mm(&self, motion: &Motion) -> f64 {
+        let (&Motion::Track { first_station, n_vertices, .. }, Some((first, last))) =
+            (motion, motion.ends())
+        else {
+            return 0.0;
+        };
+        match first_station {
+            Some(station) => self.stations[(station + n_vertices - 1) as usize].distance_mm,
+            None => {
+                let vertices = &self.vertices[first..=last];
+                vertices.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+            }
+        }
+    }
 }
 
 impl Motion {
-    /// Index of the vertex it starts on.
-    pub fn first_vertex(&self) -> usize {
+    /// Indices of the vertices it starts and ends on, if it is bound to any.
+    pub fn ends(&self) -> Option<(usize, usize)> {
         match *self {
-            Self::Hold { vertex } => vertex as usize,
-            Self::Travel { first_vertex, .. } => first_vertex as usize,
-            Self::Jump { from_vertex, .. } => from_vertex as usize,
-        }
-    }
-
-    /// Index of the vertex it ends on.
-    pub fn last_vertex(&self) -> usize {
-        match *self {
-            Self::Hold { vertex } => vertex as usize,
-            Self::Travel { first_vertex, n_vertices, .. } => {
-                first_vertex as usize + n_vertices as usize - 1
+            Self::Hold { vertex } => Some((vertex as usize, vertex as usize)),
+            Self::Travel { first_vertex, n_vertices, .. }
+            | Self::Track { first_vertex, n_vertices, .. } => {
+                let first = first_vertex as usize;
+                Some((first, (first + n_vertices as usize).saturating_sub(1)))
             }
-            Self::Jump { to_vertex, .. } => to_vertex as usize,
+            Self::Drive { .. } => None,
         }
     }
 }

@@ -3,13 +3,15 @@
 //! Small, separate, and without the planner's code: it walks the segments by itself, takes every
 //! sample through the exact optics and the nominal servo and motor, and looks at what comes out.
 
-mod jump;
 mod light;
+mod structure;
+mod track;
 mod walk;
 
 use crate::axis_loop::AxisLoop;
-use crate::galvo::{CURRENT, Galvo};
-use crate::optics::angles_from_field;
+use crate::follow::Inverse;
+use crate::galvo::{CURRENT, Galvo, State};
+use crate::optics::{angles_from_field, scale_mm_per_rad};
 use crate::servo::{Gains, ServoError};
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::PlanDraft;
@@ -21,6 +23,10 @@ use walk::{Command, Walk};
 /// which is applied after the audit. Not quite 3 %: the corners of the presets' fields take up to
 /// 97.3 % of the angle.
 pub const CORRECTION_RESERVE: f64 = 0.027;
+
+/// Commands that are computed from voltages lead the mirror, and may go so far, of the greatest
+/// angle: the mirror itself leaves [`CORRECTION_RESERVE`], and the table adds 2.7 % at the most.
+pub const COMMAND_SHARE: f64 = 0.99;
 
 /// What is called so in messages.
 const DRIVER_VOLTAGE: &str = "driver voltage";
@@ -146,14 +152,24 @@ impl AuditError {
 /// The first thing that the machine does not allow. Angle and speed may use 97.3 % of their limits
 /// (see [`CORRECTION_RESERVE`]).
 pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
-    walk::check_structure(draft)?;
     let scanner = &draft.machine.scanner;
-    let gains = Gains::design(scanner, draft.machine.output.period_s())?;
-    light::check_light(draft, gains.lag_s(&Galvo::new(scanner)))?;
-    jump::check_jumps(draft, &gains)?;
-    let mut walk = Walk::new(draft, gains);
+    let (galvo, tick_s) = (Galvo::new(scanner), draft.machine.output.period_s());
+    let gains = Gains::design(scanner, tick_s)?;
+    let invertible = gains.reference_rad(&State::zeros(), 0.0, 0.0).is_some();
+    let inverse = Inverse::new(&galvo, &gains, tick_s);
+    structure::check_structure(draft, invertible && inverse.is_some())?;
+    light::check_light(draft, gains.lag_s(&galvo))?;
+    let mut walk = Walk::new(draft, gains, inverse.as_ref());
     let mut meter = Meter::new(draft, gains);
+    let gap_max_rad = draft.tolerance_mm / scale_mm_per_rad(&draft.machine.optics);
     while let Some((command, segment_index)) = walk.next() {
+        let gap_rad = walk.gap_rad();
+        if gap_rad.is_nan() || gap_rad > gap_max_rad {
+            let place = describe(draft, segment_index, meter.n_samples);
+            let (value, limit) = (six_digits(gap_rad), six_digits(gap_max_rad));
+            let quantity = "distance from where the motion before ends";
+            return Err(AuditError::Limit { place, quantity, value, limit, unit: "rad" });
+        }
         meter.sample(draft, command, segment_index)?;
     }
     Ok(meter.limits)
@@ -164,8 +180,8 @@ struct Meter {
     axes: [AxisLoop; 2],
     heat_a2: [f64; 2],
     heat_decay: f64,
-    angle_row: crate::galvo::State,
-    speed_row: crate::galvo::State,
+    angle_row: State,
+    speed_row: State,
     n_samples: u64,
     limits: Limits,
 }

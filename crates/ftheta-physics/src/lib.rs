@@ -5,6 +5,7 @@
 pub mod audit;
 pub mod axis_loop;
 pub mod envelope;
+pub mod follow;
 pub mod galvo;
 pub mod laser;
 pub mod lossy;

@@ -78,11 +78,24 @@ impl PlanId {
             hash.count(mark.on_ns);
             hash.count(mark.off_ns);
             hash.number(mark.power_w);
+            for step in &mark.steps {
+                hash.count(step.time_ns);
+                hash.number(step.power_w);
+            }
         }
         draft.vertices.iter().for_each(|&vertex| hash.point(vertex));
-        for sequence in &draft.sequences_v {
-            hash.count(sequence.len() as u64);
-            sequence.iter().for_each(|&voltage| hash.number(voltage));
+        for station in &draft.stations {
+            hash.point(station.arriving.to_point());
+            hash.point(station.leaving.to_point());
+            hash.number(station.distance_mm);
+        }
+        for knot in &draft.knots {
+            [knot.time_s, knot.distance_mm, knot.speed_mm_s]
+                .iter()
+                .for_each(|&value| hash.number(value));
+        }
+        for pair in &draft.drives {
+            pair.iter().for_each(|value| hash.0.update(value.to_bits().to_le_bytes()));
         }
         for segment in &draft.segments {
             hash.count(segment.mark_index.map_or(u64::MAX, u64::from));
@@ -149,9 +162,23 @@ impl Feed {
                 self.number(profile.deceleration_mm_s2);
                 self.count(u64::from(interpolation == Interpolation::Dda));
             }
-            Motion::Jump { from_vertex, to_vertex, sequence } => {
+            Motion::Track {
+                first_vertex,
+                n_vertices,
+                first_station,
+                first_knot,
+                n_knots,
+                smoothing_ticks,
+            } => {
                 self.count(2);
-                [from_vertex, to_vertex, sequence].iter().for_each(|&n| self.count(u64::from(n)));
+                self.count(first_station.map_or(u64::MAX, u64::from));
+                [first_vertex, n_vertices, first_knot, n_knots, smoothing_ticks]
+                    .iter()
+                    .for_each(|&n| self.count(u64::from(n)));
+            }
+            Motion::Drive { first } => {
+                self.count(3);
+                self.count(u64::from(first));
             }
         }
     }

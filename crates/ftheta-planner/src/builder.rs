@@ -1,9 +1,7 @@
-//! From vectors to segments: marks at constant speed with a classic controller's delays, jumps at
-//! constant speed or from the atlas.
+//! From vectors to segments: marks and jumps at constant speed with a classic controller's delays.
 
 use crate::PlanError;
 use crate::classic::{Settings, check_pen};
-use crate::optimal::Jumps;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, PlannedMark, Planner, Segment, SpeedProfile};
 use ftheta_model::recipe::{Interpolation, Pen};
@@ -14,14 +12,11 @@ use kurbo::Point;
 const SAME_PLACE_MM: f64 = 5e-7;
 
 /// The content of a plan, before the audit.
-///
-/// * `jumps`: planned jumps; `None` jumps at constant speed
 pub(crate) fn draft(
     toolpath: Toolpath,
     machine: &Machine,
     settings: &Settings,
     tolerance_mm: f64,
-    jumps: Option<Jumps<'_>>,
 ) -> Result<PlanDraft, PlanError> {
     if toolpath.marks.is_empty() {
         return Err(PlanError::Empty);
@@ -37,7 +32,6 @@ pub(crate) fn draft(
         segments: Vec::new(),
         marks: Vec::with_capacity(toolpath.marks.len()),
         n_samples: 0,
-        jumps,
     };
     builder.vertices.push(Point::ZERO);
     // One tick at rest before anything moves, and room for an early laser-on edge.
@@ -51,15 +45,17 @@ pub(crate) fn draft(
     builder.jump_to(Point::ZERO)?;
     builder.hold(None, settings.lead_out_s())?;
     builder.check_edges()?;
-    let Builder { vertices, segments, marks, jumps, .. } = builder;
+    let Builder { vertices, segments, marks, .. } = builder;
     Ok(PlanDraft {
         machine: machine.clone(),
-        planner: if jumps.is_some() { Planner::Optimal } else { Planner::Classic },
+        planner: Planner::Classic,
         tolerance_mm,
         pens: toolpath.pens,
         marks,
         vertices,
-        sequences_v: jumps.map(Jumps::into_sequences).unwrap_or_default(),
+        stations: Vec::new(),
+        knots: Vec::new(),
+        drives: Vec::new(),
         segments,
     })
 }
@@ -73,7 +69,6 @@ struct Builder<'a> {
     segments: Vec<Segment>,
     marks: Vec<PlannedMark>,
     n_samples: u64,
-    jumps: Option<Jumps<'a>>,
 }
 
 impl Builder<'_> {
@@ -102,9 +97,6 @@ impl Builder<'_> {
         }
         self.segments.push(Segment { mark_index, n_ticks: n_ticks as u32, motion });
         self.n_samples += n_ticks as u64;
-        if let (Some(jumps), false) = (&mut self.jumps, matches!(motion, Motion::Jump { .. })) {
-            jumps.cool(n_ticks);
-        }
         Ok(())
     }
 
@@ -142,15 +134,6 @@ impl Builder<'_> {
             return Ok(());
         }
         let first_vertex = self.last_vertex();
-        if let Some(jumps) = &mut self.jumps
-            && let Some(jump) = jumps.plan(from, target)?
-        {
-            self.push(None, f64::from(jump.n_wait), Motion::Hold { vertex: first_vertex })?;
-            self.vertices.push(target);
-            let (from_vertex, to_vertex) = (first_vertex, first_vertex + 1);
-            let motion = Motion::Jump { from_vertex, to_vertex, sequence: jump.sequence };
-            return self.push(None, f64::from(jump.n_ticks), motion);
-        }
         self.vertices.push(target);
         let profile = constant_speed(length_mm, self.settings.jump_speed_mm_s);
         self.travel(None, (first_vertex, first_vertex + 1), profile)?;
@@ -221,6 +204,7 @@ impl Builder<'_> {
             on_ns: on_ns as u64,
             off_ns: off_ns as u64,
             power_w: pen.power_w.min(self.machine.laser.power_max_w),
+            steps: Vec::new(),
         });
         Ok(())
     }

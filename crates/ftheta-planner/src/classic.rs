@@ -41,5 +41,5 @@ pub fn draft(
     settings: &Settings,
     tolerance_mm: f64,
 ) -> Result<PlanDraft, PlanError> {
-    builder::draft(toolpath, machine, settings, tolerance_mm, None)
+    builder::draft(toolpath, machine, settings, tolerance_mm)
 }

@@ -65,6 +65,23 @@ pub enum PlanError {
         /// Off edge, µs from the first sample.
         off_us: f64,
     },
+    /// A place that the optics cannot reach, on the way of a mark.
+    #[error("the optics cannot reach ({x_mm:.3}, {y_mm:.3}) mm")]
+    Unreachable {
+        /// Place, mm.
+        x_mm: f64,
+        /// Place, mm.
+        y_mm: f64,
+    },
+    /// Motion that the angles leave no room for.
+    #[error("{place}: the mirrors' angles leave no room to come to it at its speed")]
+    NoRoom {
+        /// Mark.
+        place: String,
+    },
+    /// No voltage moves the mirror.
+    #[error("the scanner's parameters leave a mirror that no voltage moves")]
+    Immovable,
     /// The jump atlas cannot be built.
     #[error(transparent)]
     Jump(#[from] JumpError),
@@ -97,6 +114,11 @@ impl PlanError {
                 format!("on {on_us} µs, off {off_us} µs"),
                 "0 <= on <= off".into(),
             ),
+            Self::Unreachable { x_mm, y_mm } => {
+                ("optics".into(), format!("({x_mm:.3}, {y_mm:.3}) mm"), "the lens".into())
+            }
+            Self::NoRoom { place } => (place.clone(), "no motion".into(), "mirror angle".into()),
+            Self::Immovable => ("scanner".into(), "immovable".into(), "movable".into()),
             Self::Jump(error) => error.fault(),
             Self::Servo(error) => error.fault(),
             Self::Audit(error) => error.fault(),

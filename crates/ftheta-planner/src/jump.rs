@@ -10,6 +10,7 @@ mod brake;
 mod error;
 mod exact;
 mod fan;
+mod held;
 mod limit;
 mod polish;
 mod program;

@@ -1,29 +1,45 @@
-//! Planner `optimal`: jumps at the limit of motors and resonance, from the jump atlas.
+//! Planner `optimal`: marks at constant dose, between them motion at the limit of motors and
+//! resonance.
 //!
-//! Marks are still those of the classic planner, from rest to rest.
+//! Every mark is a track: the place of the beam over time, with a speed that corners and bends
+//! allow. The mirrors arrive at its first place with its speed, and leave its last place with it.
 
-use crate::classic::Settings;
-use crate::jump::{Atlas, Jump, N_LEVELS};
-use crate::{PlanError, builder};
+mod fly_by;
+mod heat;
+mod marking;
+mod path;
+mod smoothing;
+mod speed;
+mod turn;
+mod weave;
+
+use crate::PlanError;
+use crate::classic::check_pen;
+use crate::corner::Corners;
+use crate::jump::Transitions;
+use fly_by::FlyBy;
 use ftheta_model::machine::{Drive, Machine, Servo};
-use ftheta_model::plan::PlanDraft;
+use ftheta_model::plan::{PlanDraft, Planner};
 use ftheta_model::toolpath::Toolpath;
-use ftheta_physics::audit::CORRECTION_RESERVE;
-use ftheta_physics::galvo::{CURRENT, Galvo, State};
+use ftheta_physics::follow::Inverse;
+use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::angles_from_field;
 use ftheta_physics::servo::Gains;
+use heat::Heat;
 use kurbo::Point;
-use std::collections::BTreeMap;
+use marking::Marking;
+use smoothing::Smoothing;
+use weave::Weave;
 
-/// How much of the machine jumps may use, since the servo's answer to what the marks have left adds
-/// to them, and the marks themselves need some heat: how much is seen when the plan is audited.
+/// How much of the machine planned motion may use: how much the servo's answer needs besides is
+/// seen when the plan is audited.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restraint {
-    /// Part of the coil's steady heat that jumps may use.
+    /// Part of the coil's steady heat that motion between marks may use.
     pub heat_share: f64,
-    /// Part of the current that they leave.
+    /// Part of the current that it leaves.
     pub current_reserve: f64,
-    /// Part of the voltage that they leave, of what the user's reserve has left.
+    /// Part of the voltage that it leaves, of what the user's reserve has left.
     pub voltage_reserve: f64,
 }
 
@@ -34,13 +50,50 @@ pub const RESTRAINTS: [Restraint; 4] = [
     Restraint { heat_share: 0.6, current_reserve: 0.2, voltage_reserve: 0.2 },
     Restraint { heat_share: 0.4, current_reserve: 0.4, voltage_reserve: 0.4 },
 ];
-/// Near the edge of the angles a jump is prolonged by this part at a time, so that its commands,
-/// which lead the mirror, stay within them.
-const LONGER: f64 = 1.0 / 12.0;
-/// After so many prolongations a jump at constant speed, whose commands never lead, is as good.
-const N_LONGER_MAX: usize = 3;
 
-/// Why jumps of this machine cannot be planned by voltage, if they cannot.
+/// Rest before the first motion and after the last, ticks.
+const N_REST_TICKS: u32 = 4;
+
+/// How corners are taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Corner {
+    /// What costs least for what the laser can do.
+    #[default]
+    Auto,
+    /// Stops in the corner; power follows the speed.
+    Exact,
+    /// Stays within the tolerance; power follows the speed.
+    Blend,
+    /// Runs out, turns with the laser off, and runs in again at mark speed.
+    Sky,
+}
+
+impl Corner {
+    /// Its name on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Exact => "exact",
+            Self::Blend => "blend",
+            Self::Sky => "sky",
+        }
+    }
+}
+
+/// How a toolpath is planned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OptimalOptions {
+    /// Greatest distance of the beam from a mark's curve, mm.
+    pub tolerance_mm: f64,
+    /// How corners are taken.
+    pub corner: Corner,
+    /// Part of the voltage that planned motion leaves to the servo, the restraint's included.
+    pub voltage_reserve: f64,
+    /// How much of the machine may be used.
+    pub restraint: Restraint,
+}
+
+/// Why motion of this machine cannot be planned by voltage, if it cannot.
 pub fn obstacle(machine: &Machine) -> Option<&'static str> {
     match (machine.output.drive, machine.scanner.servo) {
         (Drive::BlackBox, _) => Some("the drive is a black box: what its servo does is not known"),
@@ -49,35 +102,59 @@ pub fn obstacle(machine: &Machine) -> Option<&'static str> {
     }
 }
 
-/// The content of a plan with jumps from the atlas, before the audit.
+/// The content of a plan, before the audit.
 ///
-/// * `atlas`: for this machine's scanner and period; extended as far as the jumps need
-/// * `heat_share`: that of a [`Restraint`]
+/// The beam starts and ends in the field centre.
+///
+/// * `transitions`: of this machine's scanner and period, with an atlas that reaches as far as
+///   [`longest_step_rad`]
+/// * `corners`: of the same; without them corners are averaged at lower speed
 ///
 /// # Errors
-/// As [`crate::classic::draft`], and if the atlas cannot be extended.
+/// If a pen is out of the machine's range, a mark cannot be reached, or a program fails.
 pub fn draft(
     toolpath: Toolpath,
     machine: &Machine,
-    settings: &Settings,
-    tolerance_mm: f64,
-    (atlas, heat_share): (&mut Atlas, f64),
+    (transitions, corners): (&Transitions, Option<&Corners>),
+    options: &OptimalOptions,
 ) -> Result<PlanDraft, PlanError> {
-    let longest_rad = longest_step_rad(&toolpath, machine);
-    atlas.extend(0, longest_rad)?;
-    let n_ticks_max = atlas.jump(longest_rad).map_or(0, |jump| jump.n_ticks);
-    let jumps = Jumps {
-        machine,
-        atlas,
-        galvo: Galvo::new(&machine.scanner),
-        gains: Gains::design(&machine.scanner, machine.output.period_s())?,
-        used: BTreeMap::new(),
-        sequences_v: Vec::new(),
-        heat_a2: [0.0; 2],
-        heat_max_a2: heat_share * machine.scanner.current_rms_a.powi(2),
-        n_ticks_max,
+    if toolpath.marks.is_empty() {
+        return Err(PlanError::Empty);
+    }
+    toolpath.pens.iter().try_for_each(|pen| check_pen(pen, machine))?;
+    let galvo = Galvo::new(&machine.scanner);
+    let tick_s = machine.output.period_s();
+    let gains = Gains::design(&machine.scanner, tick_s)?;
+    let inverse = Inverse::new(&galvo, &gains, tick_s).ok_or(PlanError::Immovable)?;
+    let smoothing = Smoothing::new(machine, &galvo, &gains, &inverse);
+    let Restraint { heat_share, current_reserve, .. } = options.restraint;
+    let current_max_a = (1.0 - 0.5 * current_reserve) * machine.scanner.current_max_a;
+    let fly_by = FlyBy::new(transitions, machine, gains, options.voltage_reserve, current_max_a);
+    let Toolpath { pens, marks } = toolpath;
+    let draft = PlanDraft {
+        machine: machine.clone(),
+        planner: Planner::Optimal,
+        tolerance_mm: options.tolerance_mm,
+        pens,
+        marks: Vec::with_capacity(marks.len()),
+        vertices: Vec::new(),
+        stations: Vec::new(),
+        knots: Vec::new(),
+        drives: Vec::new(),
+        segments: Vec::new(),
     };
-    builder::draft(toolpath, machine, settings, tolerance_mm, Some(jumps))
+    let heat = Heat::new(machine, heat_share);
+    let weave = Weave::new(machine, &inverse, &smoothing, fly_by, heat, draft);
+    let mut marking = Marking { weave, options, corners, galvo };
+    marking.weave.rest_in_centre(N_REST_TICKS);
+    for mark in marks {
+        marking.mark(mark)?;
+    }
+    if !marking.weave.fly_home()? {
+        return Err(PlanError::NoRoom { place: "the way back to the centre".into() });
+    }
+    marking.weave.rest_in_centre(lead_out_ticks(machine));
+    Ok(marking.weave.draft)
 }
 
 /// The longest step that an axis takes from the centre through the marks and back, rad.
@@ -97,198 +174,8 @@ pub fn longest_step_rad(toolpath: &Toolpath, machine: &Machine) -> f64 {
     longest_rad.max(back_rad)
 }
 
-/// Chooses sequences of the atlas, and lets the coils cool where they must.
-pub(crate) struct Jumps<'a> {
-    machine: &'a Machine,
-    atlas: &'a mut Atlas,
-    galvo: Galvo,
-    gains: Gains,
-    /// Sequences used so far, by level and number of ticks.
-    used: BTreeMap<(usize, usize), Used>,
-    sequences_v: Vec<Vec<f64>>,
-    /// Filtered squared current of each axis, A².
-    heat_a2: [f64; 2],
-    heat_max_a2: f64,
-    /// Ticks of the job's longest jump: none is prolonged beyond, which would need programs that no
-    /// other jump does.
-    n_ticks_max: usize,
-}
-
-/// A jump that was chosen.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Chosen {
-    /// Ticks to wait before, for the coils to cool.
-    pub(crate) n_wait: u32,
-    /// Ticks of the jump.
-    pub(crate) n_ticks: u32,
-    /// Index of its sequence.
-    pub(crate) sequence: u32,
-}
-
-/// What one sequence does at a factor of one.
-#[derive(Clone, Copy, Debug)]
-struct Used {
-    /// Index in the plan, once a jump uses it.
-    sequence: Option<u32>,
-    /// Range of the commands, rad from the start.
-    commands_rad: (f64, f64),
-    speed_rad_s: f64,
-    /// By how much it raises the heat, A².
-    heat_a2: f64,
-}
-
-impl Jumps<'_> {
-    /// The sequences that the chosen jumps refer to, V.
-    pub(crate) fn into_sequences(self) -> Vec<Vec<f64>> {
-        self.sequences_v
-    }
-
-    /// Lets the coils cool for so many ticks; what marks add is in the share left to them.
-    pub(crate) fn cool(&mut self, n_ticks: f64) {
-        let left = (-n_ticks * self.period_s() / self.machine.scanner.thermal_time_s).exp();
-        self.heat_a2 = self.heat_a2.map(|heat| heat * left);
-    }
-
-    /// The jump that arrives first, or `None` where only a slow one stays within the angles.
-    pub(crate) fn plan(&mut self, from: Point, to: Point) -> Result<Option<Chosen>, PlanError> {
-        let optics = &self.machine.optics;
-        let angles = |place: Point| angles_from_field(optics, place.into());
-        let (Some(start), Some(end)) = (angles(from), angles(to)) else {
-            return Ok(None);
-        };
-        let starts_rad = [start.x_rad, start.y_rad];
-        let steps_rad = [end.x_rad - start.x_rad, end.y_rad - start.y_rad];
-        let mut best: Option<(usize, usize, usize)> = None;
-        for level in 0..N_LEVELS {
-            // What leaves the angles at the first level leaves them at all.
-            let Some((n_ticks, rises_a2)) = self.shortest(level, starts_rad, steps_rad)? else {
-                break;
-            };
-            let Some(n_wait) = self.wait(rises_a2) else {
-                continue;
-            };
-            if best.is_none_or(|(_, n_before, ticks)| n_wait + n_ticks <= n_before + ticks) {
-                best = Some((level, n_wait, n_ticks));
-            }
-            if n_wait == 0 {
-                break;
-            }
-        }
-        best.map(|(level, n_wait, n_ticks)| self.choose(level, n_wait, n_ticks, steps_rad))
-            .transpose()
-    }
-
-    /// Fewest ticks of a level that keep commands and speed in range, and the rise in heat.
-    fn shortest(
-        &mut self,
-        level: usize,
-        starts_rad: [f64; 2],
-        steps_rad: [f64; 2],
-    ) -> Result<Option<(usize, [f64; 2])>, PlanError> {
-        let distance_rad = steps_rad[0].abs().max(steps_rad[1].abs());
-        self.atlas.extend(level, distance_rad)?;
-        let first = self.atlas.jump_at(level, distance_rad, 0).map_or(0, |jump| jump.n_ticks);
-        let scanner = &self.machine.scanner;
-        let free = 1.0 - CORRECTION_RESERVE;
-        let angle_max_rad = (free * scanner.angle_max_rad).min(self.machine.output.word_range_rad);
-        let speed_max_rad_s = free * scanner.speed_max_rad_s;
-        for longer in 0..=N_LONGER_MAX {
-            let n_ticks = first + (first as f64 * LONGER * longer as f64).ceil() as usize;
-            if longer > 0 && n_ticks > self.n_ticks_max {
-                break;
-            }
-            self.atlas.extend_ticks(level, n_ticks)?;
-            let Some(jump) = self.atlas.jump_at(level, distance_rad, n_ticks) else {
-                return Ok(None);
-            };
-            let reach_rad = distance_rad / jump.scale;
-            let used = self
-                .used
-                .entry((level, n_ticks))
-                .or_insert_with(|| measure(&jump, self.machine, &self.galvo, &self.gains));
-            let within = (0..2).all(|axis| {
-                let factor = steps_rad[axis] / reach_rad;
-                let (low, high) = used.commands_rad;
-                let places = [low, high].map(|rad| starts_rad[axis] + factor * rad);
-                places.iter().all(|place| place.abs() <= angle_max_rad)
-                    && factor.abs() * used.speed_rad_s <= speed_max_rad_s
-            });
-            if within {
-                let rise = |step_rad: f64| (step_rad / reach_rad).powi(2) * used.heat_a2;
-                return Ok(Some((n_ticks, steps_rad.map(rise))));
-            }
-        }
-        Ok(None)
-    }
-
-    /// Ticks until both coils stand a jump; `None` if one never does.
-    fn wait(&self, rises_a2: [f64; 2]) -> Option<usize> {
-        let mut n_wait = 0.0_f64;
-        for (heat_a2, rise_a2) in self.heat_a2.into_iter().zip(rises_a2) {
-            let room_a2 = self.heat_max_a2 - rise_a2;
-            if room_a2 <= 0.0 {
-                return None;
-            }
-            let wait_s = self.machine.scanner.thermal_time_s * (heat_a2 / room_a2).ln();
-            n_wait = n_wait.max((wait_s / self.period_s()).ceil());
-        }
-        Some(n_wait as usize)
-    }
-
-    fn choose(
-        &mut self,
-        level: usize,
-        n_wait: usize,
-        n_ticks: usize,
-        steps_rad: [f64; 2],
-    ) -> Result<Chosen, PlanError> {
-        let distance_rad = steps_rad[0].abs().max(steps_rad[1].abs());
-        let jump = self
-            .atlas
-            .jump_at(level, distance_rad, n_ticks)
-            .expect("the jump was found when its ticks were counted");
-        let used = self
-            .used
-            .entry((level, n_ticks))
-            .or_insert_with(|| measure(&jump, self.machine, &self.galvo, &self.gains));
-        let sequence = *used.sequence.get_or_insert_with(|| {
-            self.sequences_v.push(jump.sequence.to_vec());
-            (self.sequences_v.len() - 1) as u32
-        });
-        let (full_a2, reach_rad) = (used.heat_a2, distance_rad / jump.scale);
-        self.cool((n_wait + n_ticks) as f64);
-        for (heat_a2, step_rad) in self.heat_a2.iter_mut().zip(steps_rad) {
-            *heat_a2 += (step_rad / reach_rad).powi(2) * full_a2;
-        }
-        Ok(Chosen { n_wait: n_wait as u32, n_ticks: n_ticks as u32, sequence })
-    }
-
-    fn period_s(&self) -> f64 {
-        self.machine.output.period_s()
-    }
-}
-
-/// Plays a sequence on the nominal axis.
-fn measure(jump: &Jump<'_>, machine: &Machine, galvo: &Galvo, gains: &Gains) -> Used {
-    let tick_s = machine.output.period_s();
-    let speed_row = galvo.mirror_speed_row();
-    let mut used =
-        Used { sequence: None, commands_rad: (0.0, 0.0), speed_rad_s: 0.0, heat_a2: 0.0 };
-    let commands = crate::render::references_rad(jump.sequence, galvo, gains, tick_s);
-    for command in commands {
-        let (low, high) = used.commands_rad;
-        used.commands_rad = (low.min(command), high.max(command));
-    }
-    let step = galvo.step(tick_s);
-    let mut state = State::zeros();
-    for &voltage in jump.sequence {
-        let before_a = state[CURRENT];
-        state = step.a * state + step.b * voltage;
-        let after_a = state[CURRENT];
-        used.speed_rad_s = used.speed_rad_s.max(speed_row.dot(&state).abs());
-        // The larger of a tick's ends: never less than what is there.
-        let peak_a2 = before_a.powi(2).max(after_a.powi(2));
-        used.heat_a2 += peak_a2 * tick_s / machine.scanner.thermal_time_s;
-    }
-    used
+/// Rest at the end: until light has ended, and the mirrors have come to rest.
+fn lead_out_ticks(machine: &Machine) -> u32 {
+    let latency_s = machine.laser.off_latency_ns.max(0) as f64 * 1e-9;
+    N_REST_TICKS + 50 + (latency_s / machine.output.period_s()).ceil() as u32
 }

@@ -1,21 +1,21 @@
 //! Renders a plan into blocks of output words: the only place where millimetres become codes.
 
+mod axes;
+pub(crate) mod track;
+mod words;
+
+use axes::Axes;
 use ftheta_model::block::{Block, LaserEdge};
 use ftheta_model::plan::{Motion, SpeedProfile};
 use ftheta_model::recipe::Interpolation;
-use ftheta_model::space::{DacCodes, FieldPoint};
-use ftheta_physics::galvo::{Galvo, State};
-use ftheta_physics::map_table::MapTable;
-use ftheta_physics::optics::angles_from_field;
+use ftheta_model::space::DacCodes;
 use ftheta_physics::plan::Plan;
-use ftheta_physics::servo::Gains;
 use kurbo::{Point, Vec2};
+use track::Track;
+use words::Words;
 
 /// Samples of a block.
 pub const BLOCK_SAMPLES: usize = 4096;
-
-/// Cells around the centre of the table that are left to the exact inverse: keeps 1 nm there.
-const EXACT_CELLS: f64 = 3.0;
 
 /// A DDA adds increments of this share of a word's step.
 const DDA_FRACTION: f64 = 1.0 / 256.0;
@@ -25,23 +25,16 @@ const DDA_FRACTION: f64 = 1.0 / 256.0;
 pub struct Renderer<'a> {
     plan: &'a Plan,
     words: Words<'a>,
-    jumps: Vec<JumpShape>,
+    axes: Axes,
     segment_index: usize,
     /// Samples of the segment already rendered.
     n_rendered: u32,
     cursor: Cursor,
+    track: Option<Track>,
     next_index: u64,
-    /// Laser edges already given: two per mark.
+    /// Laser edges already given: the mark they belong to, and how many of it.
+    mark_index: usize,
     n_edges: usize,
-}
-
-/// The references of one sequence.
-#[derive(Clone)]
-struct JumpShape {
-    /// Where it leads, rad.
-    step_rad: f64,
-    /// References of its ticks at a factor of one, rad from the start.
-    references_rad: Vec<f64>,
 }
 
 /// The state of a walk along a path.
@@ -56,35 +49,35 @@ struct Cursor {
     direction: Vec2,
 }
 
-/// Turns places into words.
-#[derive(Clone)]
-struct Words<'a> {
-    plan: &'a Plan,
-    table: Option<MapTable>,
-    words_per_rad: f64,
-}
-
 impl<'a> Renderer<'a> {
     /// Starts before the first sample.
     pub fn new(plan: &'a Plan) -> Self {
-        let output = &plan.machine.output;
-        let optics = &plan.machine.optics;
-        let table = MapTable::new(0.5 * optics.field_mm, EXACT_CELLS, |x, y| {
-            let angles = angles_from_field(optics, FieldPoint::new(x, y))?;
-            Some([angles.x_rad, angles.y_rad])
-        });
-        let words = Words { plan, table, words_per_rad: 1.0 / output.word_step_rad() };
-        let cursor = Cursor::at(&plan.vertices, 0);
-        let jumps = jump_shapes(plan);
-        Self {
+        let mut renderer = Self {
             plan,
-            words,
-            jumps,
+            words: Words::new(plan),
+            axes: Axes::new(&plan.machine),
             segment_index: 0,
             n_rendered: 0,
-            cursor,
+            cursor: Cursor::at(&plan.vertices, 0),
+            track: None,
             next_index: 0,
+            mark_index: 0,
             n_edges: 0,
+        };
+        renderer.enter();
+        renderer
+    }
+
+    /// Prepares for the segment that comes next.
+    fn enter(&mut self) {
+        self.n_rendered = 0;
+        if let Some(segment) = self.plan.segments.get(self.segment_index) {
+            if let (Motion::Travel { .. }, Some((first, _))) =
+                (segment.motion, segment.motion.ends())
+            {
+                self.cursor = Cursor::at(&self.plan.vertices, first);
+            }
+            self.track = Track::new(self.plan, &segment.motion);
         }
     }
 
@@ -103,10 +96,7 @@ impl<'a> Renderer<'a> {
             self.n_rendered = end;
             if end == segment.n_ticks {
                 self.segment_index += 1;
-                self.n_rendered = 0;
-                if let Some(next) = self.plan.segments.get(self.segment_index) {
-                    self.cursor = Cursor::at(&self.plan.vertices, next.motion.first_vertex());
-                }
+                self.enter();
             }
         }
         self.next_index += block.words.len() as u64;
@@ -120,28 +110,42 @@ impl<'a> Renderer<'a> {
         let first = self.n_rendered + 1;
         match *motion {
             Motion::Hold { vertex } => {
-                let word = self.words.at(self.plan.vertices[vertex as usize]);
-                words.resize(words.len() + (end + 1 - first) as usize, word);
+                let place = self.plan.vertices[vertex as usize];
+                let mut left = (end + 1 - first) as usize;
+                if first == 1
+                    && let Some(angles) = self.axes.come_to_rest()
+                {
+                    words.push(self.words.rounded(angles));
+                    left -= 1;
+                }
+                words.resize(words.len() + left, self.words.at(place));
+                self.axes.rest(self.words.exact(place));
             }
-            Motion::Jump { from_vertex, to_vertex, sequence } => {
-                let place = |vertex: u32| self.words.exact(self.plan.vertices[vertex as usize]);
-                let (from, to) = (place(from_vertex), place(to_vertex));
-                let JumpShape { step_rad, references_rad } = &self.jumps[sequence as usize];
-                let factors = [(to[0] - from[0]) / step_rad, (to[1] - from[1]) / step_rad];
-                let references = &references_rad[(first - 1) as usize..end as usize];
-                words.extend(references.iter().map(|reference| {
-                    let angle = |axis: usize| from[axis] + factors[axis] * reference;
-                    self.words.rounded([angle(0), angle(1)])
+            Motion::Drive { first: base } => {
+                let pairs = &self.plan.drives[(base + first - 1) as usize..(base + end) as usize];
+                words.extend(pairs.iter().map(|pair| {
+                    let angles = self.axes.drive(pair.map(f64::from));
+                    self.words.rounded(angles)
                 }));
+            }
+            Motion::Track { .. } => {
+                let track = self.track.as_mut().expect("entering a track prepares it");
+                let n_samples = (end + 1 - first) as usize;
+                let angles = track.angles(self.plan, &self.words, n_samples);
+                let ends = (first == 1, end == n_ticks);
+                self.axes.follow(angles, n_samples, ends, |angles| {
+                    words.push(self.words.rounded(angles));
+                });
             }
             Motion::Travel { profile, interpolation: Interpolation::Dda, .. } => {
                 let (start, step) = self.dda(&profile, n_ticks);
                 for tick in first..=end {
                     words.push(self.words.at(start + step * f64::from(tick)));
                 }
+                self.axes.forget();
             }
             Motion::Travel { profile, .. } => {
-                let last = motion.last_vertex();
+                let last = motion.ends().map_or(0, |(_, last)| last);
                 let constant = profile.acceleration_mm_s2 == f64::INFINITY
                     && profile.deceleration_mm_s2 == f64::INFINITY;
                 for tick in first..=end {
@@ -158,6 +162,7 @@ impl<'a> Renderer<'a> {
                     };
                     words.push(self.words.at(place));
                 }
+                self.axes.forget();
             }
         }
     }
@@ -177,9 +182,11 @@ impl<'a> Renderer<'a> {
 
     fn push_edges(&mut self, block: &mut Block) {
         let end_ns = self.next_index * u64::from(self.plan.machine.output.period_ns);
-        while let Some(mark) = self.plan.marks.get(self.n_edges / 2) {
-            let edge = if self.n_edges.is_multiple_of(2) {
+        while let Some(mark) = self.plan.marks.get(self.mark_index) {
+            let edge = if self.n_edges == 0 {
                 LaserEdge { time_ns: mark.on_ns, power_w: mark.power_w }
+            } else if let Some(&step) = mark.steps.get(self.n_edges - 1) {
+                step
             } else {
                 LaserEdge { time_ns: mark.off_ns, power_w: 0.0 }
             };
@@ -187,7 +194,9 @@ impl<'a> Renderer<'a> {
                 break;
             }
             block.edges.push(edge);
-            self.n_edges += 1;
+            let last = self.n_edges == mark.steps.len() + 1;
+            self.mark_index += usize::from(last);
+            self.n_edges = if last { 0 } else { self.n_edges + 1 };
         }
     }
 }
@@ -219,68 +228,4 @@ impl Cursor {
         }
         self.from + self.direction * (distance_mm - self.start_mm)
     }
-}
-
-impl Words<'_> {
-    /// The word pair for a place.
-    #[inline]
-    fn at(&self, place: Point) -> DacCodes {
-        let tabled = self.table.as_ref().and_then(|table| table.value(place.x, place.y));
-        self.rounded(tabled.unwrap_or_else(|| self.exact(place)))
-    }
-
-    /// The word pair for angles, rad.
-    #[inline]
-    fn rounded(&self, [x_rad, y_rad]: [f64; 2]) -> DacCodes {
-        DacCodes {
-            x: (x_rad * self.words_per_rad).round_ties_even() as i32,
-            y: (y_rad * self.words_per_rad).round_ties_even() as i32,
-        }
-    }
-
-    /// The exact inverse, for places that the table leaves out.
-    #[cold]
-    fn exact(&self, place: Point) -> [f64; 2] {
-        angles_from_field(&self.plan.machine.optics, place.into())
-            .map(|angles| [angles.x_rad, angles.y_rad])
-            .expect("the audit has reached every place of the plan")
-    }
-}
-
-/// The references of every sequence of a plan.
-fn jump_shapes(plan: &Plan) -> Vec<JumpShape> {
-    let (scanner, tick_s) = (&plan.machine.scanner, plan.machine.output.period_s());
-    let galvo = Galvo::new(scanner);
-    let Ok(gains) = Gains::design(scanner, tick_s) else {
-        // The audit has built the same servo.
-        return Vec::new();
-    };
-    let shape = |sequence_v: &Vec<f64>| JumpShape {
-        step_rad: sequence_v.iter().sum::<f64>() * tick_s / galvo.torque_constant,
-        references_rad: references_rad(sequence_v, &galvo, &gains, tick_s),
-    };
-    plan.sequences_v.iter().map(shape).collect()
-}
-
-/// The references for which the nominal servo applies these voltages from rest, rad from the start:
-/// reference k is sent one tick before voltage k acts.
-///
-/// Source: `design/control.md` C, set-up b.
-pub(crate) fn references_rad(
-    sequence_v: &[f64],
-    galvo: &Galvo,
-    gains: &Gains,
-    tick_s: f64,
-) -> Vec<f64> {
-    let step = galvo.step(tick_s);
-    let (mut state, mut acting_v) = (State::zeros(), 0.0);
-    sequence_v
-        .iter()
-        .map(|&next_v| {
-            let reference_rad = gains.reference_rad(&state, acting_v, next_v);
-            state = step.a * state + step.b * acting_v;
-            acting_v = next_v;
-            reference_rad.expect("the audit refuses jumps of a servo that has no such reference")
-        })
-        .collect()
 }

@@ -50,6 +50,7 @@ fn scene(curves: &[BezPath]) -> (PlanDraft, Trace) {
             on_ns: 0,
             off_ns: 0,
             power_w: 10.0,
+            steps: Vec::new(),
         });
     }
     let plan = PlanDraft {
@@ -59,7 +60,9 @@ fn scene(curves: &[BezPath]) -> (PlanDraft, Trace) {
         pens: vec![Pen::default()],
         marks,
         vertices: Vec::new(),
-        sequences_v: Vec::new(),
+        stations: Vec::new(),
+        knots: Vec::new(),
+        drives: Vec::new(),
         segments: Vec::new(),
     };
     (plan, trace)

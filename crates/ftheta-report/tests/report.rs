@@ -88,6 +88,7 @@ impl Run {
             on_ns,
             off_ns,
             power_w: 10.0,
+            steps: Vec::new(),
         });
     }
 }
@@ -140,7 +141,9 @@ fn html() -> (String, Vec<u8>) {
         pens: vec![Pen::default(), Pen::default()],
         marks: run.marks,
         vertices: Vec::new(),
-        sequences_v: Vec::new(),
+        stations: Vec::new(),
+        knots: Vec::new(),
+        drives: Vec::new(),
         segments: Vec::new(),
     };
     let found = score(&plan, &run.trace);
@@ -208,7 +211,9 @@ fn an_empty_run_still_has_a_report() {
         pens: Vec::new(),
         marks: Vec::new(),
         vertices: Vec::new(),
-        sequences_v: Vec::new(),
+        stations: Vec::new(),
+        knots: Vec::new(),
+        drives: Vec::new(),
         segments: Vec::new(),
     };
     let found = score(&plan, &Trace { step_ns: 1000, ..Trace::default() });

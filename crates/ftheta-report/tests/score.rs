@@ -23,6 +23,7 @@ fn plan(curves: &[BezPath]) -> PlanDraft {
         on_ns: 0,
         off_ns: 0,
         power_w: 10.0,
+        steps: Vec::new(),
     });
     PlanDraft {
         machine: machine::machine(),
@@ -31,7 +32,9 @@ fn plan(curves: &[BezPath]) -> PlanDraft {
         pens: vec![Pen::default()],
         marks: marks.collect(),
         vertices: Vec::new(),
-        sequences_v: Vec::new(),
+        stations: Vec::new(),
+        knots: Vec::new(),
+        drives: Vec::new(),
         segments: Vec::new(),
     }
 }

@@ -4,7 +4,7 @@ use crate::Error;
 use ftheta_formats::atlas_file::{self, AtlasKey, AtlasLevel};
 use ftheta_model::machine::Scanner;
 use ftheta_model::warning::Warning;
-use ftheta_planner::jump::{ATLAS_VERSION, Atlas, AxisOptions, Level};
+use ftheta_planner::jump::{ATLAS_VERSION, Atlas, AxisOptions, Level, Model};
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -121,5 +121,10 @@ fn key(scanner: &Scanner, axis: AxisOptions) -> AtlasKey {
         scanner.current_max_a,
         scanner.f1_uncertainty,
     ];
-    AtlasKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?}"))
+    // Only what is held by the servo depends on it and on the torque constant's uncertainty.
+    let held = match axis.model {
+        Model::Held { .. } => Some((scanner.servo, scanner.kt_uncertainty)),
+        Model::Rigid | Model::Flexible | Model::Robust { .. } => None,
+    };
+    AtlasKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}"))
 }

@@ -14,6 +14,7 @@ use ftheta_model::warning::{Imported, Warning};
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
 use ftheta_planner::classic::Settings;
+use ftheta_planner::optimal::Corner;
 use ftheta_planner::render::Renderer;
 use ftheta_report::score::{Score, Scorer};
 use ftheta_toolpath::lay::{LayOptions, Order, lay};
@@ -27,6 +28,8 @@ pub struct MarkOptions {
     pub speed_mm_s: Option<f64>,
     /// How the motion is planned; `None` is the best that the machine allows.
     pub planner: Option<Planner>,
+    /// How planned marks take corners.
+    pub corner: Corner,
     /// Part of the voltage that planned jumps keep for the servo's feedback.
     pub reserve: f64,
     /// Where jump atlases are kept.
@@ -55,6 +58,7 @@ impl Default for MarkOptions {
         Self {
             speed_mm_s: None,
             planner: None,
+            corner: Corner::Auto,
             reserve: RESERVE,
             atlas_store: AtlasStore::none(),
             tolerance_mm: 0.010,
@@ -280,11 +284,13 @@ pub fn plan_times(plan: &PlanDraft) -> PlanTimes {
         match (segment.mark_index, segment.motion) {
             (Some(index), motion) => {
                 mark_before = Some(index);
-                if let Motion::Travel { profile, .. } = motion {
-                    times.marked_mm += profile.length_mm;
+                match motion {
+                    Motion::Travel { profile, .. } => times.marked_mm += profile.length_mm,
+                    Motion::Track { .. } => times.marked_mm += plan.track_length_mm(&motion),
+                    Motion::Hold { .. } | Motion::Drive { .. } => {}
                 }
             }
-            (None, Motion::Travel { .. } | Motion::Jump { .. }) => {
+            (None, Motion::Travel { .. } | Motion::Track { .. } | Motion::Drive { .. }) => {
                 times.n_jumps += usize::from(between);
             }
             (None, Motion::Hold { .. }) if between => {

@@ -8,12 +8,15 @@ use ftheta_model::toolpath::Toolpath;
 use ftheta_model::warning::Warning;
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
+use ftheta_physics::servo::Gains;
 use ftheta_planner::classic::{self, Settings};
-use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model};
-use ftheta_planner::optimal::{self, Restraint};
+use ftheta_planner::corner::Corners;
+use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
+use ftheta_planner::optimal::{self, OptimalOptions, Restraint};
 
-/// Part of the tolerance that may be left of a jump when a mark begins (`design/control.md`).
-const JUMP_SHARE: f64 = 1.0 / 3.0;
+/// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
+/// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
+const HELD_SHARE: f64 = 0.75;
 
 /// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
 const EPSILON_MIN_RAD: f64 = 2e-8;
@@ -55,18 +58,21 @@ impl Planning<'_> {
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
-        let Self { machine, settings, options } = *self;
-        let tolerance_mm = options.tolerance_mm;
+        let Self { machine, options, .. } = *self;
+        let (tolerance_mm, corner) = (options.tolerance_mm, options.corner);
         let mut refused = None;
         for restraint in optimal::RESTRAINTS {
-            let mut atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
+            let atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
             observer(Stage::Plan);
-            let n_kept = atlas.n_sequences();
-            let jumps = (&mut atlas, restraint.heat_share);
-            let draft = optimal::draft(toolpath.clone(), machine, settings, tolerance_mm, jumps)?;
-            if atlas.n_sequences() > n_kept {
-                options.atlas_store.save(&atlas, warnings);
-            }
+            let voltage_reserve = atlas.axis_options().voltage_reserve;
+            let transitions = Transitions::with_atlas(atlas)?;
+            let optimal = OptimalOptions { tolerance_mm, corner, voltage_reserve, restraint };
+            let gains = Gains::design(&machine.scanner, machine.output.period_s())?;
+            let scanner = transitions.atlas().scanner().clone();
+            let corners =
+                Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
+            let motions = (&transitions, Some(&corners));
+            let draft = optimal::draft(toolpath.clone(), machine, motions, &optimal)?;
             observer(Stage::Audit);
             match Plan::new(draft) {
                 Ok(plan) => return Ok(plan),
@@ -92,9 +98,9 @@ impl Planning<'_> {
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Atlas, Error> {
         let Self { machine, options, .. } = *self;
-        let epsilon_rad = JUMP_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
+        let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
         let axis = AxisOptions {
-            model: Model::Robust {
+            model: Model::Held {
                 epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD),
             },
             tick_s: machine.output.period_s(),

@@ -10,6 +10,7 @@ use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::warning::Warning;
 use ftheta::output::Output;
 use ftheta::physics::audit::Limits;
+use ftheta::planner::optimal::Corner;
 use ftheta::results::{self, About};
 use ftheta::{Error, import, machines};
 use std::path::PathBuf;
@@ -32,6 +33,7 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let options = MarkOptions {
         speed_mm_s: arguments.speed,
         planner: arguments.planner.map(Into::into),
+        corner: arguments.corner.map_or(Corner::Auto, Into::into),
         reserve: arguments.reserve,
         atlas_store: AtlasStore::new(arguments.cache.clone()),
         tolerance_mm: arguments.tolerance_um * 1e-3,

@@ -1,11 +1,12 @@
 //! Walks a plan's segments sample by sample, from their definition alone.
 
-use super::AuditError;
-use super::jump::JumpWalk;
-use crate::galvo::Galvo;
-use crate::servo::Gains;
-use ftheta_model::plan::{Motion, PlanDraft, Segment};
-use ftheta_model::recipe::Interpolation;
+use super::track::TrackWalk;
+use crate::follow::{Inverse, Taps, dot};
+use crate::galvo::{Galvo, State, Step};
+use crate::optics::angles_from_field;
+use crate::servo::{Gains, Memory, Seen};
+use ftheta_model::machine::Drive;
+use ftheta_model::plan::{Motion, PlanDraft};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use kurbo::Point;
 
@@ -21,25 +22,57 @@ pub enum Command {
 pub struct Walk<'a> {
     draft: &'a PlanDraft,
     gains: Gains,
-    galvo: Galvo,
-    jump: Option<JumpWalk<'a>>,
+    step: Step,
+    mirror_row: State,
+    inverse: Option<&'a Inverse>,
+    tick_s: f64,
+    /// Whether commands are computed from voltages, or are the wanted angles.
+    by_voltage: bool,
     segment_index: usize,
     /// Samples of the segment already given.
     n_given: u32,
     /// Vertex before the place last given, and the path length up to it.
     leg: usize,
     leg_start_mm: f64,
+    track: Option<Result<TrackWalk<'a>, FieldPoint>>,
+    /// Both axes at the tick of the sample that comes next, and the voltages acting from it on;
+    /// `None` while they follow words that were not computed from voltages.
+    axes: Option<[(State, f64); 2]>,
+    /// How far the axes are from where the segment begins, rad.
+    gap_rad: f64,
 }
 
 impl<'a> Walk<'a> {
     /// Starts at the first sample.
-    pub fn new(draft: &'a PlanDraft, gains: Gains) -> Self {
+    ///
+    /// * `inverse`: that of the nominal axis, which plans with tracks need
+    pub fn new(draft: &'a PlanDraft, gains: Gains, inverse: Option<&'a Inverse>) -> Self {
+        let tick_s = draft.machine.output.period_s();
         let galvo = Galvo::new(&draft.machine.scanner);
-        let (segment_index, n_given, leg, leg_start_mm) = (0, 0, 0, 0.0);
-        let mut walk =
-            Self { draft, gains, galvo, jump: None, segment_index, n_given, leg, leg_start_mm };
+        let known = gains.reference_rad(&State::zeros(), 0.0, 0.0).is_some();
+        let mut walk = Self {
+            draft,
+            gains,
+            step: galvo.step(tick_s),
+            mirror_row: galvo.mirror_row(),
+            inverse,
+            tick_s,
+            by_voltage: known && draft.machine.output.drive != Drive::BlackBox,
+            segment_index: 0,
+            n_given: 0,
+            leg: 0,
+            leg_start_mm: 0.0,
+            track: None,
+            axes: None,
+            gap_rad: 0.0,
+        };
         walk.enter();
         walk
+    }
+
+    /// How far the segment of the sample given last begins from where the one before ended, rad.
+    pub fn gap_rad(&self) -> f64 {
+        self.gap_rad
     }
 
     /// The next sample, or `None` after the last.
@@ -47,14 +80,26 @@ impl<'a> Walk<'a> {
         let segment = self.draft.segments.get(self.segment_index)?;
         let index = self.segment_index;
         self.n_given += 1;
-        let command = match &mut self.jump {
-            Some(jump) => Command::Angles(jump.next()),
-            None => {
+        let command = match segment.motion {
+            Motion::Track { .. } => self.track(),
+            Motion::Drive { first } => {
+                let pair = self.draft.drives[(first + self.n_given - 1) as usize];
+                self.driven(pair.map(f64::from))
+            }
+            Motion::Hold { vertex } => {
+                let place: FieldPoint = self.draft.vertices[vertex as usize].into();
+                match self.by_voltage && self.axes.is_some() && self.n_given == 1 {
+                    true => self.driven([0.0; 2]),
+                    false => Command::Place(place),
+                }
+            }
+            Motion::Travel { .. } => {
                 let last = self.n_given == segment.n_ticks;
                 Command::Place(self.place(&segment.motion, last).into())
             }
         };
         if self.n_given == segment.n_ticks {
+            self.leave(&segment.motion);
             self.segment_index += 1;
             self.n_given = 0;
             self.enter();
@@ -65,21 +110,119 @@ impl<'a> Walk<'a> {
     fn enter(&mut self) {
         self.leg_start_mm = 0.0;
         if let Some(segment) = self.draft.segments.get(self.segment_index) {
-            self.leg = segment.motion.first_vertex();
-            self.jump = JumpWalk::new(self.draft, &segment.motion, &self.gains, &self.galvo);
+            if let Some((first, _)) = segment.motion.ends() {
+                self.leg = first;
+            }
+            self.track = TrackWalk::new(self.draft, &segment.motion);
+            self.gap_rad = self.gap(&segment.motion);
+        }
+    }
+
+    /// Distance between the mirrors after the motion before and where `motion` begins, rad.
+    fn gap(&self, motion: &Motion) -> f64 {
+        let wanted = match (motion, &self.track) {
+            (&Motion::Hold { vertex }, _) => {
+                let place = self.draft.vertices[vertex as usize].into();
+                angles_from_field(&self.draft.machine.optics, place)
+                    .map(|angles| [angles.x_rad, angles.y_rad])
+            }
+            (Motion::Track { .. }, Some(Ok(track))) => Some(track.now()),
+            _ => None,
+        };
+        let (Some(axes), Some(wanted), true) = (&self.axes, wanted, self.by_voltage) else {
+            return 0.0;
+        };
+        let off = |axis: usize| (self.mirror_row.dot(&axes[axis].0) - wanted[axis]).abs();
+        off(0).max(off(1))
+    }
+
+    /// What a segment leaves the axes in, for a drive that follows.
+    fn leave(&mut self, motion: &Motion) {
+        match *motion {
+            Motion::Hold { vertex } => {
+                let place = self.draft.vertices[vertex as usize].into();
+                self.axes = angles_from_field(&self.draft.machine.optics, place).map(|angles| {
+                    let rest = |rad: f64| (State::new(rad, 0.0, 0.0, 0.0, 0.0), 0.0);
+                    [rest(angles.x_rad), rest(angles.y_rad)]
+                });
+            }
+            Motion::Travel { .. } => self.axes = None,
+            Motion::Track { .. } => {
+                if let (Some(Ok(track)), Some(inverse)) = (&self.track, self.inverse) {
+                    self.axes = Some([0, 1].map(|axis| inverse.state(&track.around(axis))));
+                }
+            }
+            Motion::Drive { .. } => {}
+        }
+    }
+
+    /// The command that makes the servo apply these voltages after what acts now; the axes move on.
+    fn driven(&mut self, next: [f64; 2]) -> Command {
+        if !self.by_voltage {
+            return Command::Angles(MirrorAngles { x_rad: next[0], y_rad: next[1] });
+        }
+        let mut axes = self.axes.unwrap_or([(State::zeros(), 0.0); 2]);
+        let mut angles = [0.0; 2];
+        for (axis, (state, acting_v)) in axes.iter_mut().enumerate() {
+            let answer_v = |reference_rad: f64| {
+                let seen = Seen {
+                    state: *state,
+                    sensor_rad: 0.0,
+                    sensor_error_rad: 0.0,
+                    voltage_v: *acting_v,
+                };
+                self.gains.voltage(&mut Memory::default(), reference_rad, &seen, self.tick_s)
+            };
+            // The servo answers linearly.
+            let (without_v, with_v) = (answer_v(0.0), answer_v(1.0));
+            angles[axis] = (next[axis] - without_v) / (with_v - without_v);
+            *state = self.step.a * *state + self.step.b * *acting_v;
+            *acting_v = next[axis];
+        }
+        self.axes = Some(axes);
+        Command::Angles(MirrorAngles { x_rad: angles[0], y_rad: angles[1] })
+    }
+
+    /// The command of the next sample of a track.
+    fn track(&mut self) -> Command {
+        let track = match &mut self.track {
+            Some(Ok(track)) => track,
+            Some(Err(place)) => return Command::Place(*place),
+            None => return Command::Place(FieldPoint::default()),
+        };
+        let around: [Taps; 2] = [track.around(0), track.around(1)];
+        let after = track.after();
+        if let Err(place) = track.advance() {
+            let command = Command::Place(place);
+            self.track = Some(Err(place));
+            return command;
+        }
+        if !self.by_voltage {
+            return Command::Angles(MirrorAngles { x_rad: after[0], y_rad: after[1] });
+        }
+        let Some(inverse) = self.inverse else {
+            return Command::Place(FieldPoint::default());
+        };
+        let around_next = [track.around(0), track.around(1)];
+        match inverse.reference {
+            // The first command joins what was before to the first voltage of the track.
+            Some(taps) if self.n_given > 1 || self.axes.is_none() => {
+                let [x_rad, y_rad] = around.map(|angles| dot(&taps, &angles));
+                Command::Angles(MirrorAngles { x_rad, y_rad })
+            }
+            _ => self.driven(around_next.map(|angles| dot(&inverse.voltage, &angles))),
         }
     }
 
     fn place(&mut self, motion: &Motion, last: bool) -> Point {
         let vertices = &self.draft.vertices;
-        let &Motion::Travel { profile, .. } = motion else {
+        let (&Motion::Travel { profile, .. }, Some((_, end))) = (motion, motion.ends()) else {
             return vertices[self.leg];
         };
-        let end = motion.last_vertex();
         if last {
             return vertices[end];
         }
-        let time_s = f64::from(self.n_given) * self.draft.machine.output.period_s();
+        let time_s = f64::from(self.n_given) * self.tick_s;
         let distance_mm = profile.distance_mm(time_s);
         loop {
             let (from, to) = (vertices[self.leg], vertices[self.leg + 1]);
@@ -93,82 +236,4 @@ impl<'a> Walk<'a> {
             self.leg += 1;
         }
     }
-}
-
-/// Checks that indices exist, numbers are finite and segments join end to end from the centre.
-pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
-    let malformed = |place: String, what: &str| AuditError::Malformed { place, what: what.into() };
-    if draft.segments.is_empty() {
-        return Err(malformed("the plan".into(), "no segments"));
-    }
-    if let Some(index) = draft.vertices.iter().position(|vertex| !vertex.is_finite()) {
-        return Err(malformed(format!("vertex {index}"), "a coordinate is not finite"));
-    }
-    if let Some(index) = draft.marks.iter().position(|mark| mark.pen_index >= draft.pens.len()) {
-        return Err(malformed(format!("mark {index}"), "its pen does not exist"));
-    }
-    let mut at = Point::ZERO;
-    for (index, segment) in draft.segments.iter().enumerate() {
-        let place = || format!("segment {index}");
-        if segment.n_ticks == 0 {
-            return Err(malformed(place(), "no samples"));
-        }
-        if segment.mark_index.is_some_and(|mark| mark as usize >= draft.marks.len()) {
-            return Err(malformed(place(), "its mark does not exist"));
-        }
-        if segment.motion.last_vertex() >= draft.vertices.len() {
-            return Err(malformed(place(), "its vertices do not exist"));
-        }
-        check_profile(draft, &segment.motion).map_err(|what| malformed(place(), what))?;
-        if let Motion::Jump { sequence, .. } = segment.motion {
-            check_sequence(draft, sequence, segment).map_err(|what| malformed(place(), what))?;
-        }
-        if draft.vertices[segment.motion.first_vertex()] != at {
-            return Err(malformed(place(), "it does not start where the one before ends"));
-        }
-        at = draft.vertices[segment.motion.last_vertex()];
-    }
-    Ok(())
-}
-
-/// Checks that a jump's sequence is there, as long as the segment, and leads somewhere.
-fn check_sequence(draft: &PlanDraft, index: u32, segment: &Segment) -> Result<(), &'static str> {
-    let Some(sequence_v) = draft.sequences_v.get(index as usize) else {
-        return Err("its sequence does not exist");
-    };
-    if sequence_v.len() != segment.n_ticks as usize {
-        return Err("its sequence is not as long as its samples");
-    }
-    let sum_v: f64 = sequence_v.iter().sum();
-    if !sum_v.is_finite() || sum_v == 0.0 {
-        return Err("its sequence leads nowhere");
-    }
-    if segment.mark_index.is_some() {
-        return Err("a jump cannot belong to a mark");
-    }
-    Ok(())
-}
-
-/// Checks a travel's speed profile against its vertices: `render` trusts the length.
-fn check_profile(draft: &PlanDraft, motion: &Motion) -> Result<(), &'static str> {
-    let &Motion::Travel { n_vertices, profile, interpolation, .. } = motion else {
-        return Ok(());
-    };
-    let positive = |value: f64| value > 0.0;
-    if n_vertices < 2
-        || !(profile.length_mm.is_finite() && profile.speed_mm_s.is_finite())
-        || !(positive(profile.length_mm) && positive(profile.speed_mm_s))
-        || !(positive(profile.acceleration_mm_s2) && positive(profile.deceleration_mm_s2))
-    {
-        return Err("its speed profile is impossible");
-    }
-    if interpolation == Interpolation::Dda && n_vertices != 2 {
-        return Err("a DDA takes one vector at a time");
-    }
-    let vertices = &draft.vertices[motion.first_vertex()..=motion.last_vertex()];
-    let length_mm: f64 = vertices.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-    if (length_mm - profile.length_mm).abs() > 1e-9 * (1.0 + length_mm) {
-        return Err("its profile is not as long as its vertices");
-    }
-    Ok(())
 }

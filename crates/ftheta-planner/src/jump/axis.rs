@@ -1,6 +1,7 @@
 //! One axis as the jump programs see it: discrete motion, limits, and plants to be robust against.
 
 use super::fan::Ask;
+use super::held::Held;
 use super::program::{self, Ends, Goal, Request, Way};
 use super::{JumpError, polish};
 use ftheta_model::machine::Scanner;
@@ -59,6 +60,13 @@ pub enum Model {
     /// rest may be off the target too. Single steps, not atlases: a program takes seconds.
     Closest {
         /// Allowed end error, rad mechanical.
+        epsilon_rad: f64,
+    },
+    /// The nominal mode, exactly at the end; held by the servo, every plant whose mode and torque
+    /// constant are within the scanner's uncertainty stays within this many rad of the nominal
+    /// mirror from there on.
+    Held {
+        /// Allowed distance, rad mechanical.
         epsilon_rad: f64,
     },
 }
@@ -149,6 +157,8 @@ pub struct Axis {
     pub(super) residual_max_rad: f64,
     /// Whether the place of rest may be off the target, within that bound.
     pub(super) rests_anywhere: bool,
+    /// Plants that the servo has to hold within the same bound.
+    pub(super) held: Vec<Held>,
     /// Current where it is checked inside the tick.
     inside: Vec<Weights>,
     /// The same where the program bounds it.
@@ -168,17 +178,22 @@ impl Axis {
         let (galvo, active, rest): (Galvo, &'static [usize], &'static [usize]) = match options.model
         {
             Model::Rigid => (rigid(&nominal), &[0, 1, 4], &[1, 4]),
-            Model::Flexible => (nominal, &[0, 1, 2, 3, 4], &[1, 2, 3, 4]),
+            Model::Flexible | Model::Held { .. } => (nominal, &[0, 1, 2, 3, 4], &[1, 2, 3, 4]),
             Model::Robust { .. } | Model::Closest { .. } => (nominal, &[0, 1, 2, 3, 4], &[4]),
         };
         let watched = |watch: Watch, epsilon_rad: f64| {
             let plants = uncertain(&nominal, scanner.f1_uncertainty, options.tick_s, watch);
             (plants, watch.error_share * epsilon_rad)
         };
+        let mut held = Vec::new();
         let (plants, residual_max_rad) = match options.model {
             Model::Rigid | Model::Flexible => (Vec::new(), f64::INFINITY),
             Model::Robust { epsilon_rad } => watched(ROBUST, epsilon_rad),
             Model::Closest { epsilon_rad } => watched(CLOSEST, epsilon_rad),
+            Model::Held { epsilon_rad } => {
+                held = Held::plants(scanner, options.tick_s)?;
+                (Vec::new(), ROBUST.error_share * epsilon_rad)
+            }
         };
         let (inside, bounded) = match options.current_bound {
             CurrentBound::Always => currents(&galvo, options.tick_s),
@@ -201,6 +216,7 @@ impl Axis {
             plants,
             residual_max_rad,
             rests_anywhere: matches!(options.model, Model::Closest { .. }),
+            held,
             inside,
             bounded,
         })
@@ -383,7 +399,9 @@ fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64, watch: Watch) -> Ve
 pub(crate) fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpError> {
     let tiny = f64::MIN_POSITIVE;
     let epsilon_rad = match options.model {
-        Model::Robust { epsilon_rad } | Model::Closest { epsilon_rad } => epsilon_rad,
+        Model::Robust { epsilon_rad }
+        | Model::Closest { epsilon_rad }
+        | Model::Held { epsilon_rad } => epsilon_rad,
         Model::Rigid | Model::Flexible => 1.0,
     };
     let ranges = [
@@ -397,6 +415,7 @@ pub(crate) fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpE
         ("greatest voltage V", scanner.voltage_max_v, tiny, 1e4),
         ("greatest current A", scanner.current_max_a, tiny, 1e4),
         ("uncertainty of the torsional mode", scanner.f1_uncertainty, 0.0, 0.5),
+        ("uncertainty of the torque constant", scanner.kt_uncertainty, 0.0, 0.5),
         ("tick s", options.tick_s, 1e-9, 1e-2),
         ("voltage reserve", options.voltage_reserve, 0.0, 0.95),
         ("allowed end error rad", epsilon_rad, 1e-12, 1.0),

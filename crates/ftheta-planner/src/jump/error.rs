@@ -28,6 +28,9 @@ pub enum JumpError {
         /// What the solver says.
         status: String,
     },
+    /// No servo is known that would hold the axis.
+    #[error("the scanner's servo cannot be built, or has a memory that outlasts a jump")]
+    NoServo,
     /// The step is longer than what the greatest allowed number of ticks reaches.
     #[error("a step of {step_rad} rad needs more than {limit} ticks of {tick_us} µs")]
     TooLong {
@@ -50,6 +53,7 @@ impl JumpError {
             Self::Unsolved { n_ticks, status, .. } => {
                 (format!("jump of {n_ticks} ticks"), status.clone(), "a solution".into())
             }
+            Self::NoServo => ("scanner.servo".into(), "unknown".into(), "state feedback".into()),
             Self::TooLong { step_rad, limit, .. } => {
                 ("jump".into(), format!("{step_rad} rad"), format!("{limit} ticks"))
             }

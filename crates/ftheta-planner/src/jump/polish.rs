@@ -1,6 +1,7 @@
 //! Makes a solver's voltages exact: the end met, limits kept also inside the ticks.
 
 use super::axis::{Axis, Look, Plant};
+use super::held::{Deviation, Held};
 use super::program::{Ends, Request, Solution};
 use ftheta_physics::galvo::{State, Step};
 use nalgebra::{DMatrix, DVector};
@@ -46,6 +47,7 @@ pub(super) fn polish(
     let room = (axis.voltage_max_v / peak_voltage_v)
         .min(axis.current_max_a / peak_current_a)
         .min(axis.residual_max_rad / residual_rad(axis, ends, factor, &voltages_v))
+        .min(axis.residual_max_rad / held_rad(axis, ends, factor, &voltages_v))
         .min(1.0)
         * INSIDE;
     voltages_v.iter_mut().for_each(|voltage| *voltage *= room);
@@ -149,4 +151,18 @@ fn residual_rad(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> f6
         plant.looks.iter().map(at_look).fold(0.0, f64::max)
     };
     axis.plants.iter().map(residual).fold(0.0, f64::max)
+}
+
+/// Greatest distance of the held plants from the nominal mirror, rad.
+fn held_rad(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> f64 {
+    let distance = |plant: &Held| {
+        let mut state = ends.start * factor;
+        let mut deviation = Deviation::zeros();
+        for &voltage_v in voltages_v {
+            deviation = plant.advance(&deviation, &state, voltage_v);
+            state = axis.advance(&state, voltage_v);
+        }
+        plant.looks.iter().map(|weights| weights.dot(&deviation).abs()).fold(0.0, f64::max)
+    };
+    axis.held.iter().map(distance).fold(0.0, f64::max)
 }

@@ -5,6 +5,7 @@
 
 use super::JumpError;
 use super::axis::Axis;
+use super::held::N_DEVIATIONS;
 use crate::convex::{self, Rows};
 use clarabel::solver::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use ftheta_physics::galvo::{CURRENT, State};
@@ -108,6 +109,11 @@ impl Units {
         let size = start.component_div(&state).amax().max(end.component_div(&state).amax());
         Self { voltage, state, factor: size.recip() }
     }
+
+    /// Unit of a held plant's deviation: hundredths of the state's own.
+    fn deviation(&self, index: usize) -> f64 {
+        0.01 * self.state.get(index).copied().unwrap_or(self.voltage)
+    }
 }
 
 /// Where each variable stands: voltage and then states for each tick, the factor, and for each
@@ -117,6 +123,7 @@ struct Layout {
     n_states: usize,
     n_plants: usize,
     n_looks: usize,
+    n_held: usize,
     /// Whether the place of rest off its target is a variable, the last.
     rests_anywhere: bool,
 }
@@ -145,9 +152,14 @@ impl Layout {
         self.deviation(plant, DEVIATING.len() + look)
     }
 
+    /// Column of a held plant's deviation.
+    fn held(&self, plant: usize, index: usize) -> usize {
+        self.deviation(self.n_plants, 0) + N_DEVIATIONS * plant + index
+    }
+
     /// Column of how far the place of rest is off the target, in units of the bound.
     fn place(&self) -> usize {
-        self.deviation(self.n_plants, 0)
+        self.held(self.n_held, 0)
     }
 
     fn n_columns(&self) -> usize {
@@ -175,6 +187,7 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
         n_states: axis.active.len(),
         n_plants: axis.plants.len(),
         n_looks: axis.plants.first().map_or(0, |plant| plant.looks.len()),
+        n_held: axis.held.len(),
         rests_anywhere: axis.rests_anywhere,
     };
     let units = Units::new(axis, request);
@@ -182,9 +195,11 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
     program.motion();
     program.ends();
     program.deviations();
+    program.held_deviations();
     let n_equal = program.rows.len();
     program.bounds();
     program.way();
+    program.held_bounds();
     program.creep_sizes();
     let n_bounds = program.rows.len() - n_equal;
     program.residuals();
@@ -282,6 +297,45 @@ impl Program<'_> {
                     }
                 }
                 rows.add(entries, 0.0);
+            }
+        }
+    }
+
+    /// Adds how each held plant deviates at the end.
+    fn held_deviations(&mut self) {
+        let Self { axis, request, layout, units, rows } = self;
+        for (plant, one) in axis.held.iter().enumerate() {
+            for index in 0..N_DEVIATIONS {
+                let unit = units.deviation(index);
+                let ticks = one.deviation(index, request.n_ticks);
+                let from_factor = ticks[0].0.dot(&request.ends.start) * units.factor / unit;
+                let mut entries =
+                    vec![(layout.held(plant, index), -1.0), (layout.factor(), from_factor)];
+                for (tick, (weights, gain)) in ticks.iter().enumerate() {
+                    entries.push((layout.voltage(tick), gain * units.voltage / unit));
+                    if tick > 0 {
+                        entries.extend(axis.active.iter().enumerate().map(|(position, &from)| {
+                            (layout.state(tick, position), weights[from] * units.state[from] / unit)
+                        }));
+                    }
+                }
+                rows.add(entries, 0.0);
+            }
+        }
+    }
+
+    /// Adds that each held plant is near the nominal mirror at each look.
+    fn held_bounds(&mut self) {
+        let Self { axis, layout, units, rows, .. } = self;
+        for (plant, one) in axis.held.iter().enumerate() {
+            for weights in &one.looks {
+                for sign in [1.0, -1.0] {
+                    let entries = (0..N_DEVIATIONS).map(|index| {
+                        let weight = sign * weights[index] * units.deviation(index);
+                        (layout.held(plant, index), weight / axis.residual_max_rad)
+                    });
+                    rows.add(entries, 1.0);
+                }
             }
         }
     }

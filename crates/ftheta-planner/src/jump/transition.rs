@@ -116,7 +116,14 @@ impl Transitions {
     /// If a parameter is out of range or a program fails.
     pub fn new(scanner: &Scanner, axis: AxisOptions) -> Result<Self, JumpError> {
         let range_rad = 2.0 * scanner.angle_max_rad;
-        let atlas = Atlas::build(scanner, AtlasOptions { axis, range_rad })?;
+        Self::with_atlas(Atlas::build(scanner, AtlasOptions { axis, range_rad })?)
+    }
+
+    /// Transitions with an atlas that reaches as far as steps from rest to rest will.
+    ///
+    /// # Errors
+    /// If a parameter is out of range.
+    pub fn with_atlas(atlas: Atlas) -> Result<Self, JumpError> {
         let mut n_ticks = N_TICKS_MIN;
         let mut fans = Vec::new();
         while n_ticks <= N_TICKS_MAX {
@@ -127,14 +134,20 @@ impl Transitions {
                 _ => 4,
             };
         }
+        let scanner = atlas.scanner();
         Ok(Self {
-            axis: Axis::new(scanner, axis)?,
-            atlas,
+            axis: Axis::new(scanner, atlas.axis_options())?,
             angle_max_rad: scanner.angle_max_rad,
             speed_max_rad_s: scanner.speed_max_rad_s,
+            atlas,
             fans,
             brakes: OnceLock::new(),
         })
+    }
+
+    /// The jumps from rest to rest.
+    pub fn atlas(&self) -> &Atlas {
+        &self.atlas
     }
 
     /// The voltages of a route, or `None` if no motion within the angles makes it.

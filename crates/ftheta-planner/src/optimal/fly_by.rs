@@ -1,0 +1,207 @@
+//! Motion between marks: from the state that one leaves to the state that the next begins in.
+//!
+//! The transition between both places and speeds comes from the fans. What the states have besides
+//! (a lens bends straight lines a little, a mark may end in a curve) is added by the voltages of
+//! least square that do it in the same time.
+
+use super::heat::Heat;
+use crate::jump::{JumpError, Route, Transitions};
+use ftheta_model::machine::Machine;
+use ftheta_physics::audit::COMMAND_SHARE;
+use ftheta_physics::galvo::{CURRENT, Galvo, State, Step};
+use ftheta_physics::servo::Gains;
+use nalgebra::{SMatrix, SVector};
+use std::collections::BTreeMap;
+
+/// Factors by which a transition is prolonged, where heat or the angles do not allow it faster.
+const LONGER: [f64; 10] = [1.0, 1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.6, 5.0, 8.0];
+/// Fewest ticks in which states are joined.
+const N_TICKS_MIN: usize = 6;
+/// Most ticks of a transition.
+const N_TICKS_MAX: usize = 4000;
+/// Part of what the fans leave of the voltage that corrections may use.
+const CORRECTION_SHARE: f64 = 0.5;
+
+/// Both axes at a tick.
+pub(super) type States = [State; 2];
+
+/// Voltages of both axes, tick by tick.
+pub(super) type Voltages = Vec<[f64; 2]>;
+
+/// Plans motion between states.
+pub(super) struct FlyBy<'a> {
+    transitions: &'a Transitions,
+    machine: &'a Machine,
+    step: Step,
+    mirror_row: State,
+    speed_row: State,
+    gains: Gains,
+    voltage_max_v: f64,
+    current_max_a: f64,
+    /// Voltages of least square per number of ticks.
+    least: BTreeMap<usize, Vec<State>>,
+    /// Scales of the states, so that none is lost beside another.
+    units: State,
+}
+
+impl<'a> FlyBy<'a> {
+    /// * `voltage_reserve`: part of the voltage that transitions leave
+    pub(super) fn new(
+        transitions: &'a Transitions,
+        machine: &'a Machine,
+        gains: Gains,
+        voltage_reserve: f64,
+        current_max_a: f64,
+    ) -> Self {
+        let scanner = &machine.scanner;
+        let galvo = Galvo::new(scanner);
+        let tick_s = machine.output.period_s();
+        let speed = galvo.torque_constant / galvo.inertia() * scanner.current_max_a * tick_s;
+        let free = 1.0 - voltage_reserve * CORRECTION_SHARE;
+        Self {
+            transitions,
+            machine,
+            step: galvo.step(tick_s),
+            mirror_row: galvo.mirror_row(),
+            speed_row: galvo.mirror_speed_row(),
+            gains,
+            voltage_max_v: free * scanner.voltage_max_v,
+            current_max_a,
+            least: BTreeMap::new(),
+            units: State::new(speed * tick_s, speed, speed * tick_s, speed, scanner.current_max_a),
+        }
+    }
+
+    /// The voltages from states to states, in the fewest ticks that are known to do, or more where
+    /// the coils are hot; `None` if there is no room.
+    ///
+    /// # Errors
+    /// If a program fails.
+    pub(super) fn between(
+        &mut self,
+        from: &States,
+        to: &States,
+        heat: &Heat,
+    ) -> Result<Option<Voltages>, JumpError> {
+        let routes = [0, 1].map(|axis| Route {
+            from_rad: self.mirror_row.dot(&from[axis]),
+            to_rad: self.mirror_row.dot(&to[axis]),
+            from_rad_s: self.speed_row.dot(&from[axis]),
+            to_rad_s: self.speed_row.dot(&to[axis]),
+        });
+        let planned = self.transitions.plan_both(&routes)?;
+        let mut n_fewest = N_TICKS_MIN;
+        if let Some([x, y]) = planned {
+            n_fewest = x.n_ticks().max(N_TICKS_MIN);
+            let voltages: Voltages =
+                x.voltages_v().zip(y.voltages_v()).map(|(x, y)| [x, y]).collect();
+            if let Some(voltages) = self.corrected(voltages, from, to)
+                && self.allows(&voltages, from, heat)
+            {
+                return Ok(Some(voltages));
+            }
+        }
+        for factor in LONGER {
+            let n_ticks = (n_fewest as f64 * factor).ceil() as usize;
+            if n_ticks > N_TICKS_MAX {
+                break;
+            }
+            if let Some(voltages) = self.corrected(vec![[0.0; 2]; n_ticks], from, to)
+                && self.allows(&voltages, from, heat)
+            {
+                return Ok(Some(voltages));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Adds what makes both ends exact.
+    pub(super) fn corrected(
+        &mut self,
+        mut voltages: Voltages,
+        from: &States,
+        to: &States,
+    ) -> Option<Voltages> {
+        let n_ticks = voltages.len();
+        if n_ticks < N_TICKS_MIN {
+            return None;
+        }
+        let mut end = *from;
+        for pair in &voltages {
+            for axis in 0..2 {
+                end[axis] = self.step.a * end[axis] + self.step.b * pair[axis];
+            }
+        }
+        let least = self.least(n_ticks)?;
+        for axis in 0..2 {
+            let left = to[axis] - end[axis];
+            for (pair, weights) in voltages.iter_mut().zip(least) {
+                pair[axis] += weights.dot(&left);
+            }
+        }
+        Some(voltages)
+    }
+
+    /// A state one tick later.
+    pub(super) fn advance(&self, state: &State, voltage_v: f64) -> State {
+        self.step.a * state + self.step.b * voltage_v
+    }
+
+    /// Weights of a change of state in each voltage that makes it with the least square.
+    fn least(&mut self, n_ticks: usize) -> Option<&[State]> {
+        if !self.least.contains_key(&n_ticks) {
+            let weights = least_square(&self.step, &self.units, n_ticks)?;
+            self.least.insert(n_ticks, weights);
+        }
+        self.least.get(&n_ticks).map(Vec::as_slice)
+    }
+
+    /// Whether voltages keep every limit of motor, mirror and output word.
+    pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States, heat: &Heat) -> bool {
+        let scanner = &self.machine.scanner;
+        let command_max_rad =
+            COMMAND_SHARE * scanner.angle_max_rad.min(self.machine.output.word_range_rad);
+        let free = 1.0 - ftheta_physics::audit::CORRECTION_RESERVE;
+        let (angle_max_rad, speed_max_rad_s) =
+            (free * scanner.angle_max_rad, free * scanner.speed_max_rad_s);
+        let mut hot = heat.clone();
+        let mut states = *from;
+        let mut acting = voltages.first().copied().unwrap_or_default();
+        for (tick, pair) in voltages.iter().enumerate() {
+            let next = voltages.get(tick + 1).copied().unwrap_or(*pair);
+            for axis in 0..2 {
+                let state = &states[axis];
+                let command = self.gains.reference_rad(state, acting[axis], next[axis]);
+                let after = self.step.a * state + self.step.b * pair[axis];
+                let fine = pair[axis].abs() <= self.voltage_max_v
+                    && after[CURRENT].abs() <= self.current_max_a
+                    && self.mirror_row.dot(&after).abs() <= angle_max_rad
+                    && self.speed_row.dot(&after).abs() <= speed_max_rad_s
+                    && command.is_none_or(|rad| rad.abs() <= command_max_rad);
+                if !fine {
+                    return false;
+                }
+                states[axis] = after;
+            }
+            hot.tick([states[0][CURRENT], states[1][CURRENT]]);
+            acting = next;
+        }
+        !hot.is_hot()
+    }
+}
+
+/// `Bᵀ (B Bᵀ)⁻¹` of `n_ticks` voltages, in scaled states.
+fn least_square(step: &Step, units: &State, n_ticks: usize) -> Option<Vec<State>> {
+    let scaled = |state: &State| state.component_div(units);
+    let mut effects: Vec<State> = Vec::with_capacity(n_ticks);
+    let mut effect = step.b;
+    for _ in 0..n_ticks {
+        effects.push(scaled(&effect));
+        effect = step.a * effect;
+    }
+    effects.reverse();
+    let mut gram = SMatrix::<f64, 5, 5>::zeros();
+    effects.iter().for_each(|effect| gram += effect * effect.transpose());
+    let inverse = gram.cholesky()?.inverse();
+    Some(effects.iter().map(|effect| scaled(&SVector::from(inverse * effect))).collect())
+}

@@ -1,0 +1,314 @@
+//! One mark after the other: its speed, its corners, its light.
+
+use super::path::Path;
+use super::speed::{SpeedLimits, profile, time_at_s};
+use super::turn::{Allowance, Turn, candidates, straight_mm};
+use super::weave::{Laid, Stretch, Weave};
+use super::{Corner, OptimalOptions};
+use crate::PlanError;
+use crate::corner::Corners;
+use ftheta_model::plan::{Knot, PlannedMark};
+use ftheta_model::recipe::Pen;
+use ftheta_model::toolpath::Mark;
+use ftheta_physics::galvo::Galvo;
+use ftheta_physics::optics::scale_mm_per_rad;
+
+/// Part of the tolerance by which a plan itself may miss a curve; the rest is for the machine.
+const MISS_SHARE: f64 = 0.85;
+/// The same in corners whose programs stand other motors by themselves.
+const TURN_SHARE: f64 = 0.93;
+/// By how much of the tolerance the corner itself may be missed: a beam that is within the tolerance
+/// of both legs of a right angle misses it by √2.
+const COVERAGE_SHARE: f64 = 1.35;
+/// Part of the greatest angular acceleration that the beam may have along a mark.
+const ALONG_SHARE: f64 = 0.35;
+/// Part of the voltage and current that marks may use.
+const MARK_SHARE: f64 = 0.8;
+/// Corners sharper than this are stopped in, where the path is to be exact, rad.
+const STOP_RAD: f64 = 0.02;
+/// Least power, as a part of the pen's, so that light does not end before the mark does.
+const POWER_MIN: f64 = 1e-3;
+
+/// Plans mark after mark.
+pub(super) struct Marking<'a> {
+    pub(super) weave: Weave<'a>,
+    pub(super) options: &'a OptimalOptions,
+    pub(super) corners: Option<&'a Corners>,
+    pub(super) galvo: Galvo,
+}
+
+/// A stretch between two turns, and the turn after it.
+struct Piece {
+    stretch: Stretch,
+    laid: Laid,
+    /// Its speed as a part of what was asked for.
+    part: f64,
+}
+
+/// Power from times on, s and W.
+type Powers = Vec<(f64, f64)>;
+
+impl Marking<'_> {
+    /// Flies to a mark and makes it.
+    ///
+    /// # Errors
+    /// If it cannot be reached, or a program fails.
+    pub(super) fn mark(&mut self, mark: Mark) -> Result<(), PlanError> {
+        let pen = self.weave.draft.pens[mark.pen_index].clone();
+        let Some(path) = Path::new(&mark).or_else(|| Path::straight(&mark.points)) else {
+            return Ok(());
+        };
+        let limits = self.limits(&pen);
+        let sky = match self.options.corner {
+            Corner::Sky => true,
+            Corner::Auto => !self.weave.machine.laser.power_modulated,
+            Corner::Exact | Corner::Blend => false,
+        };
+        if sky {
+            let cuts = self.sharp(&path, &limits);
+            for (part, curve) in path.cut(&mark.curve, &cuts) {
+                self.stroke(Mark { curve, ..mark.clone() }, part, &pen, &limits)?;
+            }
+            return Ok(());
+        }
+        self.stroke(mark, path, &pen, &limits)
+    }
+
+    /// A stretch of light without a break.
+    fn stroke(
+        &mut self,
+        mark: Mark,
+        path: Path,
+        pen: &Pen,
+        limits: &SpeedLimits,
+    ) -> Result<(), PlanError> {
+        let index = self.weave.draft.marks.len() as u32;
+        let place = format!("mark {index} ({})", mark.source);
+        let mut turns = self.turns(&path, limits)?;
+        let (pieces, joints) = loop {
+            if let Some(pieces) = self.pieces(&path, &turns, limits, &place)? {
+                if let Some(joints) = self.joints(&pieces, &turns) {
+                    break (pieces, joints);
+                }
+                turns.clear();
+            }
+        };
+        if !self.weave.fly_to(&pieces[0].laid)? {
+            return Err(PlanError::NoRoom { place });
+        }
+        let start_s = self.weave.now_s();
+        let mut end_s = start_s;
+        let mut progress_mm = Vec::new();
+        let corner_mm = |turn: &Turn| path.stations[turn.vertex].distance_mm;
+        for (piece_index, piece) in pieces.iter().enumerate() {
+            let piece_s = self.weave.now_s();
+            self.weave.follow(index, &piece.laid);
+            let before = piece_index.checked_sub(1).and_then(|before| turns.get(before));
+            let offset_mm = before.map_or(0.0, |turn| corner_mm(turn));
+            add_progress(&mut progress_mm, &self.progress_mm(piece), offset_mm);
+            end_s = piece_s + time_at_s(&piece.stretch.knots, piece.stretch.path.length_mm());
+            if let (Some(voltages), Some(turn)) = (joints.get(piece_index), turns.get(piece_index))
+            {
+                self.weave.drive(Some(index), voltages);
+                let parts = [piece.part, pieces[piece_index + 1].part];
+                add_progress(&mut progress_mm, &turn.progress_mm(parts), corner_mm(turn));
+            }
+        }
+        let steady = pieces.len() == 1 && pieces[0].stretch.knots.len() == 1;
+        let laser = &self.weave.machine.laser;
+        let powers = match laser.power_modulated && !steady {
+            true => {
+                let times_s = (start_s, self.weave.period_s());
+                powers(pen, laser.power_max_w, &progress_mm, times_s)
+            }
+            false => Powers::new(),
+        };
+        let planned = PlannedMark {
+            curve: mark.curve,
+            pen_index: mark.pen_index,
+            source: mark.source,
+            on_ns: 0,
+            off_ns: 0,
+            power_w: powers.first().map_or(pen.power_w, |&(_, power_w)| power_w),
+            steps: Vec::new(),
+        };
+        self.weave.light(planned, [start_s, end_s], &powers)
+    }
+
+    /// Corners of a path that can be taken by programs.
+    fn turns(&self, path: &Path, limits: &SpeedLimits) -> Result<Vec<Turn>, PlanError> {
+        let (Some(corners), true) = (self.corners, limits.stop_rad == f64::INFINITY) else {
+            return Ok(Vec::new());
+        };
+        let tolerance_mm = self.options.tolerance_mm;
+        let allowance = Allowance {
+            contour_mm: TURN_SHARE * tolerance_mm,
+            coverage_mm: COVERAGE_SHARE * tolerance_mm,
+        };
+        let speed = limits.speed_mm_s;
+        let margin_mm = speed * self.weave.smoothing.half_s;
+        let mut turns: Vec<Turn> = Vec::new();
+        for vertex in self.sharp(path, limits) {
+            let machine = self.weave.machine;
+            let Some(turn) = Turn::new(corners, machine, path, vertex, (speed, allowance))? else {
+                continue;
+            };
+            let runs_mm = turn.runs_s().map(|run_s| speed * run_s);
+            let (before_mm, after_mm) = (runs_mm[0] + margin_mm, runs_mm[1] + margin_mm);
+            let room_mm = match turns.last() {
+                Some(last) => {
+                    let way_mm =
+                        path.stations[vertex].distance_mm - path.stations[last.vertex].distance_mm;
+                    way_mm - speed * (last.runs_s()[1] + 2.0 * self.weave.period_s())
+                }
+                None => path.stations[vertex].distance_mm,
+            };
+            let left_mm = path.length_mm() - path.stations[vertex].distance_mm;
+            let fits = straight_mm(path, vertex, false, before_mm) >= runs_mm[0]
+                && straight_mm(path, vertex, true, after_mm) >= runs_mm[1]
+                && room_mm >= runs_mm[0]
+                && left_mm >= runs_mm[1];
+            if fits {
+                turns.push(turn);
+            }
+        }
+        Ok(turns)
+    }
+
+    /// Vertices too sharp for the mark speed.
+    fn sharp(&self, path: &Path, limits: &SpeedLimits) -> Vec<usize> {
+        let limit = (limits.miss_mm, limits.change_mm_s);
+        candidates(path, limits.speed_mm_s, self.weave.smoothing, limit)
+    }
+
+    /// The stretches between turns; `None` after taking out turns that have not the room.
+    fn pieces(
+        &mut self,
+        path: &Path,
+        turns: &[Turn],
+        limits: &SpeedLimits,
+        place: &str,
+    ) -> Result<Option<Vec<Piece>>, PlanError> {
+        let mut pieces = Vec::with_capacity(turns.len() + 1);
+        let last_vertex = path.vertices.len() - 1;
+        for index in 0..=turns.len() {
+            let before = index.checked_sub(1).map(|before| &turns[before]);
+            let after = turns.get(index);
+            let from = before.map_or(0, |turn| turn.vertex);
+            let to = after.map_or(last_vertex, |turn| turn.vertex);
+            let path = path.part(from, to);
+            let knots = profile(&path, limits, self.weave.smoothing);
+            let whole_s = time_at_s(&knots, path.length_mm());
+            let starts_s = before.map_or(0.0, |turn| turn.runs_s()[1]);
+            let ends_s = after.map_or(0.0, |turn| turn.runs_s()[0]);
+            let period_s = self.weave.period_s();
+            let left_s = whole_s - starts_s - ends_s;
+            let (n_ticks, factor) = match after {
+                None => (None, 1.0),
+                Some(_) => {
+                    let n_ticks = (left_s / period_s - 1e-6).ceil().max(1.0);
+                    let all_s = n_ticks * period_s + starts_s + ends_s;
+                    (Some(n_ticks as u32), all_s / whole_s)
+                }
+            };
+            let knots = knots
+                .into_iter()
+                .map(|knot| Knot {
+                    time_s: knot.time_s * factor - starts_s,
+                    speed_mm_s: knot.speed_mm_s / factor,
+                    ..knot
+                })
+                .collect();
+            let stretch = Stretch { path, knots, n_ticks };
+            let laid = self.weave.lay(&stretch, place)?;
+            pieces.push(Piece { stretch, laid, part: factor.recip() });
+        }
+        Ok(Some(pieces))
+    }
+
+    /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
+    /// than the motors stand.
+    fn joints(&mut self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
+        let mut joints = Vec::with_capacity(turns.len());
+        for (turn, pair) in turns.iter().zip(pieces.windows(2)) {
+            let voltages = turn.voltages_v([pair[0].part, pair[1].part]);
+            let (from, to) = (pair[0].laid.ends(), pair[1].laid.starts());
+            let voltages = self.weave.fly_by.corrected(voltages, from, to)?;
+            if !self.weave.allows(&voltages, from) {
+                return None;
+            }
+            joints.push(voltages);
+        }
+        Some(joints)
+    }
+
+    /// Progress of the beam along the path at every tick of a stretch, from the first to the end,
+    /// mm.
+    fn progress_mm(&self, piece: &Piece) -> Vec<f64> {
+        let Stretch { knots, path, .. } = &piece.stretch;
+        let n_ticks = piece.laid.n_ticks();
+        if let [knot] = knots[..] {
+            let step_mm = knot.speed_mm_s * self.weave.period_s();
+            let first_mm = knot.distance_mm - knot.speed_mm_s * knot.time_s;
+            return (0..=n_ticks).map(|tick| first_mm + f64::from(tick) * step_mm).collect();
+        }
+        path.nearest_mm(&self.weave.places(&piece.laid))
+    }
+
+    fn limits(&self, pen: &Pen) -> SpeedLimits {
+        let machine = self.weave.machine;
+        let scanner = &machine.scanner;
+        let scale = scale_mm_per_rad(&machine.optics);
+        let most = self.galvo.torque_constant / self.galvo.inertia() * scanner.current_max_a;
+        let speed_mm_s = pen.mark_speed_mm_s;
+        let voltage_max_v =
+            MARK_SHARE * (1.0 - self.options.voltage_reserve) * scanner.voltage_max_v;
+        let current_max_a = MARK_SHARE * scanner.current_max_a;
+        SpeedLimits {
+            speed_mm_s,
+            acceleration_mm_s2: ALONG_SHARE * most * scale,
+            miss_mm: MISS_SHARE * self.options.tolerance_mm,
+            change_mm_s: self.weave.smoothing.change_max_mm_s(
+                speed_mm_s,
+                voltage_max_v,
+                current_max_a,
+            ),
+            stop_rad: match self.options.corner {
+                Corner::Exact => STOP_RAD,
+                Corner::Auto | Corner::Blend | Corner::Sky => f64::INFINITY,
+            },
+        }
+    }
+}
+
+/// Appends places along a stretch, whose first tick is the last of the stretch before.
+///
+/// * `offset_mm`: what they count from, along the whole path
+fn add_progress(all_mm: &mut Vec<f64>, stretch_mm: &[f64], offset_mm: f64) {
+    all_mm.pop();
+    all_mm.extend(stretch_mm.iter().map(|at_mm| at_mm + offset_mm));
+}
+
+/// Power of each tick, so that every millimetre gets the pen's energy: what a tick cannot give,
+/// because the laser has no more, the next one does.
+///
+/// * `progress_mm`: along the path, at each tick from `start_s` on
+fn powers(
+    pen: &Pen,
+    power_max_w: f64,
+    progress_mm: &[f64],
+    (start_s, period_s): (f64, f64),
+) -> Powers {
+    let energy_j_mm = pen.power_w / pen.mark_speed_mm_s;
+    let most_mm = power_max_w * period_s / energy_j_mm;
+    let least_mm = POWER_MIN * pen.mark_speed_mm_s * period_s;
+    let mut given_mm = progress_mm.first().copied().unwrap_or(0.0);
+    let windows = progress_mm.windows(2).enumerate();
+    windows
+        .map(|(tick, pair)| {
+            let step_mm = (pair[1] - given_mm).clamp(least_mm, most_mm);
+            given_mm += step_mm;
+            (start_s + tick as f64 * period_s, step_mm * energy_j_mm / period_s)
+        })
+        .collect()
+}

@@ -1,0 +1,198 @@
+//! A mark's curve as a path for tracks: vertices, directions and arc lengths.
+
+use ftheta_model::plan::Station;
+use ftheta_model::toolpath::Mark;
+use kurbo::{BezPath, Line, ParamCurve, ParamCurveArclen, ParamCurveDeriv, PathSeg, Point, Vec2};
+
+/// Vertices closer than this are one, mm: half the trace's resolution.
+const SAME_PLACE_MM: f64 = 5e-7;
+/// Most that a curve turns between two vertices, rad: the cubic between is then within 1e-8 of the
+/// radius.
+const TURN_MAX_RAD: f64 = 0.1;
+/// A curve is halved at most so often.
+const N_HALVINGS_MAX: u32 = 14;
+/// How far ahead a nearest point is looked for, besides three times the beam's way, mm.
+const NEAR_MM: f64 = 0.05;
+/// Error of a leg's arc length, relative to it.
+const LENGTH_ERROR: f64 = 1e-11;
+
+/// Vertices of a path without a double, with what is known there.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Path {
+    pub(super) vertices: Vec<Point>,
+    /// One per vertex.
+    pub(super) stations: Vec<Station>,
+    /// Whether a leg is anything but a straight line.
+    pub(super) curved: bool,
+}
+
+impl Path {
+    /// The path of a mark; `None` if it has no length.
+    pub(super) fn new(mark: &Mark) -> Option<Self> {
+        let mut path = Self::default();
+        for segment in mark.curve.segments() {
+            match segment {
+                PathSeg::Line(line) => path.push_line(line.p1, line.p0),
+                PathSeg::Quad(_) | PathSeg::Cubic(_) => {
+                    path.curved = true;
+                    path.push_curve(&segment, N_HALVINGS_MAX);
+                }
+            }
+        }
+        (path.vertices.len() >= 2).then_some(path)
+    }
+
+    /// A straight path through points.
+    pub(super) fn straight(points: &[Point]) -> Option<Self> {
+        let mut curve = BezPath::new();
+        curve.move_to(*points.first()?);
+        points[1..].iter().for_each(|&point| curve.line_to(point));
+        let mut path = Self::default();
+        for segment in curve.segments() {
+            let line: Line = Line::new(segment.start(), segment.end());
+            path.push_line(line.p1, line.p0);
+        }
+        (path.vertices.len() >= 2).then_some(path)
+    }
+
+    /// Arc length, mm.
+    pub(super) fn length_mm(&self) -> f64 {
+        self.stations[self.stations.len() - 1].distance_mm
+    }
+
+    /// The paths and curves between vertices, which are corners of the curve.
+    pub(super) fn cut(&self, curve: &BezPath, vertices: &[usize]) -> Vec<(Self, BezPath)> {
+        let mut parts = Vec::with_capacity(vertices.len() + 1);
+        let mut segments = curve.segments().peekable();
+        let mut first = 0;
+        let last = self.vertices.len() - 1;
+        for &vertex in vertices.iter().chain([&last]) {
+            let end = self.vertices[vertex];
+            let mut part = Vec::new();
+            while let Some(segment) = segments.next() {
+                part.push(segment);
+                let rest = segments.peek();
+                // The last part takes all that is left.
+                if vertex != last && segment.end().distance(end) <= SAME_PLACE_MM && rest.is_some()
+                {
+                    break;
+                }
+            }
+            parts.push((self.part(first, vertex), BezPath::from_path_segments(part.into_iter())));
+            first = vertex;
+        }
+        parts
+    }
+
+    /// The part from one vertex to another.
+    pub(super) fn part(&self, first: usize, last: usize) -> Self {
+        let start_mm = self.stations[first].distance_mm;
+        let mut stations = self.stations[first..=last].to_vec();
+        stations.iter_mut().for_each(|station| station.distance_mm -= start_mm);
+        Self { vertices: self.vertices[first..=last].to_vec(), stations, curved: self.curved }
+    }
+
+    /// Arc lengths of the points nearest to places that go along the path.
+    pub(super) fn nearest_mm(&self, places: &[Point]) -> Vec<f64> {
+        let mut leg = 0;
+        let mut at_mm = 0.0_f64;
+        let mut before = places.first().copied().unwrap_or_default();
+        let n_legs = self.vertices.len() - 1;
+        places
+            .iter()
+            .map(|&place| {
+                // What the beam can have gone, and as much as a corner may be cut.
+                let reach_mm = at_mm + 3.0 * before.distance(place) + NEAR_MM;
+                let mut nearest = (f64::INFINITY, at_mm, leg);
+                for index in leg..n_legs {
+                    if index > leg && self.stations[index].distance_mm > reach_mm {
+                        break;
+                    }
+                    let (off_mm, along_mm) = self.foot(index, place);
+                    if off_mm < nearest.0 {
+                        nearest = (off_mm, along_mm, index);
+                    }
+                }
+                before = place;
+                (at_mm, leg) = (nearest.1.max(at_mm), nearest.2);
+                at_mm
+            })
+            .collect()
+    }
+
+    /// Distance of a place from a leg, and arc length of the leg's nearest point; before the first
+    /// leg and after the last it goes straight on.
+    fn foot(&self, leg: usize, place: Point) -> (f64, f64) {
+        let (from, to) = (self.vertices[leg], self.vertices[leg + 1]);
+        let start_mm = self.stations[leg].distance_mm;
+        let length_mm = self.stations[leg + 1].distance_mm - start_mm;
+        let chord = to - from;
+        let share = (place - from).dot(chord) / chord.hypot2();
+        let low = if leg == 0 { f64::NEG_INFINITY } else { 0.0 };
+        let high = if leg + 2 == self.vertices.len() { f64::INFINITY } else { 1.0 };
+        let share = share.clamp(low, high);
+        ((from + chord * share).distance(place), start_mm + share * length_mm)
+    }
+
+    fn push_line(&mut self, to: Point, from: Point) {
+        let start = *self.vertices.last().unwrap_or(&from);
+        let chord = to - start;
+        let length_mm = chord.hypot();
+        if length_mm > SAME_PLACE_MM {
+            let direction = chord / length_mm;
+            self.push(start, direction, to, direction, length_mm);
+        }
+    }
+
+    /// Halves a curve until its parts bend little.
+    fn push_curve(&mut self, curve: &PathSeg, n_halvings: u32) {
+        let length_mm = curve.arclen(SAME_PLACE_MM);
+        if length_mm <= SAME_PLACE_MM {
+            return;
+        }
+        let chord = curve.end() - curve.start();
+        let [start, end] = tangents(curve);
+        let bend = angle(start, chord).abs().max(angle(chord, end).abs());
+        if n_halvings > 0 && (bend > 0.5 * TURN_MAX_RAD || length_mm > 1.01 * chord.hypot()) {
+            self.push_curve(&curve.subsegment(0.0..0.5), n_halvings - 1);
+            self.push_curve(&curve.subsegment(0.5..1.0), n_halvings - 1);
+            return;
+        }
+        let length_mm = curve.arclen((LENGTH_ERROR * length_mm).max(1e-15));
+        self.push(curve.start(), start, curve.end(), end, length_mm.max(chord.hypot()));
+    }
+
+    fn push(&mut self, from: Point, leaving: Vec2, to: Point, arriving: Vec2, length_mm: f64) {
+        match self.stations.last_mut() {
+            Some(last) => last.leaving = leaving,
+            None => {
+                self.vertices.push(from);
+                self.stations.push(Station { arriving: leaving, leaving, distance_mm: 0.0 });
+            }
+        }
+        let distance_mm = self.length_mm() + length_mm;
+        self.vertices.push(to);
+        self.stations.push(Station { arriving, leaving: arriving, distance_mm });
+    }
+}
+
+/// Signed angle from one direction to another, rad.
+pub(super) fn angle(from: Vec2, to: Vec2) -> f64 {
+    from.cross(to).atan2(from.dot(to))
+}
+
+/// Directions at the ends, where control points may coincide.
+fn tangents(curve: &PathSeg) -> [Vec2; 2] {
+    let cubic = curve.to_cubic();
+    let chord = cubic.p3 - cubic.p0;
+    let derivative = cubic.deriv();
+    let unit = |direction: Vec2, point: f64| {
+        let least_mm = SAME_PLACE_MM;
+        if direction.hypot() > least_mm {
+            return direction.normalize();
+        }
+        let near = derivative.eval(point).to_vec2();
+        if near.hypot() > 0.0 { near.normalize() } else { chord.normalize() }
+    };
+    [unit(cubic.p1 - cubic.p0, 1e-3), unit(cubic.p3 - cubic.p2, 1.0 - 1e-3)]
+}

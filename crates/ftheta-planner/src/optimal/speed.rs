@@ -1,0 +1,251 @@
+//! Speed along a path: as fast as corners, bends and motors allow, at most the mark speed.
+//!
+//! Averaging cuts a corner the more, the faster it is passed. A vertex passed at speed v with
+//! acceleration a on both sides is missed by `sin(θ/2) (v m₁ + a m₂ / 2)`, with the mean and the
+//! mean square of the averaged time. What several vertices within that time miss adds up.
+
+use super::path::{Path, angle};
+use super::smoothing::Smoothing;
+use ftheta_model::plan::Knot;
+
+/// Part of what may be missed by which the acceleration alone may miss a reversal.
+const ACCELERATION_SHARE: f64 = 1.4;
+/// Steps by which a speed is lowered until bends are passed within the allowance.
+const SLOWER: f64 = 0.9;
+/// Turns below this, rad, are left out: what 32-bit coordinates make of a straight line.
+const TURN_MIN_RAD: f64 = 1e-7;
+
+/// What limits the speed along marks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SpeedLimits {
+    /// Mark speed, mm/s.
+    pub(super) speed_mm_s: f64,
+    /// Greatest acceleration along the path, mm/s².
+    pub(super) acceleration_mm_s2: f64,
+    /// By how much averaging may miss a vertex, mm.
+    pub(super) miss_mm: f64,
+    /// Greatest change of velocity at once, mm/s.
+    pub(super) change_mm_s: f64,
+    /// Whether to stop in corners that are sharper than `stop_rad`.
+    pub(super) stop_rad: f64,
+}
+
+/// A vertex where the path turns.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    at_mm: f64,
+    angle_rad: f64,
+    corner_rad: f64,
+}
+
+/// A place with its greatest speed, and how long to stay there.
+#[derive(Clone, Copy, Debug)]
+struct Limit {
+    at_mm: f64,
+    speed_mm_s: f64,
+    wait_s: f64,
+}
+
+/// The speed profile of a path: at least one knot.
+pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) -> Vec<Knot> {
+    let acceleration_mm_s2 =
+        limits.acceleration_mm_s2.min(ACCELERATION_SHARE * limits.miss_mm / smoothing.variance_s2);
+    let turns = turns(path);
+    let mut slow: Vec<Limit> = Vec::new();
+    for (index, turn) in turns.iter().enumerate() {
+        let speed_mm_s = if turn.corner_rad.abs() > limits.stop_rad {
+            0.0
+        } else {
+            passing_mm_s(&turns, index, limits, smoothing, acceleration_mm_s2)
+        };
+        let wait_s = if speed_mm_s == 0.0 { 2.0 * smoothing.half_s } else { 0.0 };
+        if speed_mm_s < limits.speed_mm_s {
+            slow.push(Limit { at_mm: turn.at_mm, speed_mm_s, wait_s });
+        }
+    }
+    knots(path.length_mm(), slow, limits.speed_mm_s, acceleration_mm_s2)
+}
+
+/// Where the path turns, with half of every curved leg's bend counted at each of its ends.
+fn turns(path: &Path) -> Vec<Turn> {
+    let stations = &path.stations;
+    let bend = |leg: usize| match path.curved {
+        true => angle(stations[leg].leaving, stations[leg + 1].arriving),
+        false => 0.0,
+    };
+    let last = stations.len() - 1;
+    let mut turns = Vec::new();
+    for (index, station) in stations.iter().enumerate() {
+        let corner_rad = match index {
+            0 => 0.0,
+            _ if index == last => 0.0,
+            _ => angle(station.arriving, station.leaving),
+        };
+        let before = if index > 0 { bend(index - 1) } else { 0.0 };
+        let after = if index < last { bend(index) } else { 0.0 };
+        let angle_rad = corner_rad + 0.5 * (before + after);
+        if angle_rad.abs() > TURN_MIN_RAD {
+            turns.push(Turn { at_mm: station.distance_mm, angle_rad, corner_rad });
+        }
+    }
+    turns
+}
+
+/// Greatest speed past a turn and its neighbours.
+fn passing_mm_s(
+    turns: &[Turn],
+    index: usize,
+    limits: &SpeedLimits,
+    smoothing: &Smoothing,
+    acceleration_mm_s2: f64,
+) -> f64 {
+    let mut speed_mm_s = limits.speed_mm_s;
+    loop {
+        let (missed, turned) = weighed(turns, index, speed_mm_s * smoothing.half_s);
+        let sine = (0.5 * missed.abs()).min(std::f64::consts::FRAC_PI_2).sin();
+        let change = 2.0 * (0.5 * turned.abs()).min(std::f64::consts::FRAC_PI_2).sin();
+        let slowest = speed_mm_s < 1e-3 * limits.speed_mm_s;
+        if slowest || change * speed_mm_s <= limits.change_mm_s {
+            let room_mm = limits.miss_mm / sine;
+            if slowest || speed_mm_s * smoothing.mean_s <= room_mm {
+                return speed_mm_s;
+            }
+            // Slower than the mark speed there is acceleration on both sides.
+            let bend_mm = 0.5 * acceleration_mm_s2 * smoothing.variance_s2;
+            let passing = (room_mm - bend_mm) / smoothing.mean_s;
+            if speed_mm_s <= passing {
+                return speed_mm_s;
+            }
+            if passing > 0.5 * speed_mm_s && alone(turns, index, speed_mm_s * smoothing.half_s) {
+                return passing;
+            }
+        }
+        speed_mm_s *= SLOWER;
+    }
+}
+
+/// Whether no other turn lies within a reach.
+fn alone(turns: &[Turn], index: usize, reach_mm: f64) -> bool {
+    let at_mm = turns[index].at_mm;
+    (index == 0 || at_mm - turns[index - 1].at_mm > reach_mm)
+        && turns.get(index + 1).is_none_or(|next| next.at_mm - at_mm > reach_mm)
+}
+
+/// Turns around one: each by its share in what is missed there, and all within the reach, rad.
+fn weighed(turns: &[Turn], index: usize, reach_mm: f64) -> (f64, f64) {
+    let at_mm = turns[index].at_mm;
+    let (mut missed, mut turned) = (turns[index].angle_rad, turns[index].angle_rad);
+    let mut add = |turn: &Turn| {
+        let off = (turn.at_mm - at_mm).abs() / reach_mm;
+        if off >= 1.0 {
+            return false;
+        }
+        // What three averages make of a turn beside the middle, within a few hundredths.
+        missed += turn.angle_rad * (1.0 - off).powi(3);
+        turned += turn.angle_rad * (1.0 - off);
+        true
+    };
+    for turn in turns[..index].iter().rev() {
+        if !add(turn) {
+            break;
+        }
+    }
+    for turn in &turns[index + 1..] {
+        if !add(turn) {
+            break;
+        }
+    }
+    (missed, turned)
+}
+
+/// Knots under limits at places, with one acceleration up and down.
+fn knots(
+    length_mm: f64,
+    mut slow: Vec<Limit>,
+    most_mm_s: f64,
+    acceleration_mm_s2: f64,
+) -> Vec<Knot> {
+    let steady = Knot { time_s: 0.0, distance_mm: 0.0, speed_mm_s: most_mm_s };
+    if slow.is_empty() {
+        return vec![steady];
+    }
+    spread(&mut slow, acceleration_mm_s2);
+    let mut knots: Vec<Knot> = Vec::with_capacity(4 * slow.len());
+    let ramp_mm = |from: f64, to: f64| (to * to - from * from).abs() / (2.0 * acceleration_mm_s2);
+    let first = slow[0];
+    // Before the first limit and after the last there is nothing to slow down for.
+    let before_mm = ramp_mm(first.speed_mm_s, most_mm_s);
+    let start_mm_s = match first.at_mm > before_mm {
+        true => most_mm_s,
+        false => (first.speed_mm_s.powi(2) + 2.0 * acceleration_mm_s2 * first.at_mm).sqrt(),
+    };
+    knots.push(Knot { speed_mm_s: start_mm_s, ..steady });
+    let mut from = Limit { at_mm: 0.0, speed_mm_s: start_mm_s, wait_s: 0.0 };
+    let end = Limit { at_mm: length_mm, speed_mm_s: f64::INFINITY, wait_s: 0.0 };
+    for to in slow.into_iter().chain([end]) {
+        leg(&mut knots, from, to, most_mm_s, acceleration_mm_s2);
+        from = to;
+    }
+    knots
+}
+
+/// Lowers limits so that each is reached from its neighbours.
+fn spread(slow: &mut [Limit], acceleration_mm_s2: f64) {
+    let n_limits = slow.len();
+    let mut lower = |from: usize, to: usize| {
+        let room_mm = (slow[to].at_mm - slow[from].at_mm).abs();
+        let reach = (slow[from].speed_mm_s.powi(2) + 2.0 * acceleration_mm_s2 * room_mm).sqrt();
+        slow[to].speed_mm_s = slow[to].speed_mm_s.min(reach);
+    };
+    for index in 1..n_limits {
+        lower(index - 1, index);
+    }
+    for index in (1..n_limits).rev() {
+        lower(index, index - 1);
+    }
+}
+
+/// Up, along, and down between two limits; then waits.
+fn leg(knots: &mut Vec<Knot>, from: Limit, to: Limit, most_mm_s: f64, acceleration_mm_s2: f64) {
+    let room_mm = to.at_mm - from.at_mm;
+    let (u, v) = (from.speed_mm_s, to.speed_mm_s.min(most_mm_s));
+    let last = to.speed_mm_s == f64::INFINITY;
+    let a = acceleration_mm_s2;
+    let peak = if last {
+        (u * u + 2.0 * a * room_mm).sqrt().min(most_mm_s)
+    } else {
+        (0.5 * (u * u + v * v) + a * room_mm).sqrt().min(most_mm_s)
+    };
+    let end = if last { peak } else { v };
+    let (up_mm, down_mm) =
+        ((peak * peak - u * u) / (2.0 * a), (peak * peak - end * end) / (2.0 * a));
+    let mut push = |distance_mm: f64, speed_mm_s: f64, duration_s: f64| {
+        let before = knots[knots.len() - 1];
+        if duration_s > 1e-12 {
+            // From the rounded length, so that times and distances fit exactly.
+            let mean = 0.5 * (before.speed_mm_s + speed_mm_s);
+            let distance_mm = if mean > 0.0 { distance_mm } else { before.distance_mm };
+            let duration_s =
+                if mean > 0.0 { (distance_mm - before.distance_mm) / mean } else { duration_s };
+            let time_s = before.time_s + duration_s;
+            knots.push(Knot { time_s, distance_mm, speed_mm_s });
+        }
+    };
+    push(from.at_mm + up_mm, peak, (peak - u) / a);
+    push(to.at_mm - down_mm, peak, (room_mm - up_mm - down_mm) / peak);
+    push(to.at_mm, end, (peak - end) / a);
+    push(to.at_mm, end, to.wait_s);
+}
+
+/// Time at which a profile has covered a distance, s.
+pub(super) fn time_at_s(knots: &[Knot], distance_mm: f64) -> f64 {
+    let index = knots.partition_point(|knot| knot.distance_mm < distance_mm).max(1) - 1;
+    let from = knots[index];
+    let gap_mm = distance_mm - from.distance_mm;
+    let acceleration = knots
+        .get(index + 1)
+        .map_or(0.0, |to| (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s));
+    let speed = (from.speed_mm_s.powi(2) + 2.0 * acceleration * gap_mm).max(0.0).sqrt();
+    // Both roots alike: neither a small acceleration nor a small speed is divided by.
+    from.time_s + 2.0 * gap_mm / (from.speed_mm_s + speed)
+}

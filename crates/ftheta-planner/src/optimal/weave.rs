@@ -1,0 +1,239 @@
+//! Weaves marks and the motion between them into one flowing plan.
+
+use super::fly_by::{FlyBy, States, Voltages};
+use super::heat::Heat;
+use super::path::Path;
+use super::smoothing::Smoothing;
+use super::speed::time_at_s;
+use crate::PlanError;
+use crate::render::track::{angles_around, places};
+use ftheta_model::block::LaserEdge;
+use ftheta_model::machine::Machine;
+use ftheta_model::plan::{Knot, Motion, PlanDraft, PlannedMark, Segment};
+use ftheta_physics::follow::Inverse;
+use ftheta_physics::galvo::{CURRENT, State};
+use ftheta_physics::optics::angles_from_field;
+use kurbo::Point;
+
+/// Changes of power below this part of it are left out.
+const POWER_STEP: f64 = 2e-3;
+
+/// A plan that grows.
+pub(super) struct Weave<'a> {
+    pub(super) machine: &'a Machine,
+    pub(super) inverse: &'a Inverse,
+    pub(super) smoothing: &'a Smoothing,
+    pub(super) fly_by: FlyBy<'a>,
+    pub(super) draft: PlanDraft,
+    n_samples: u64,
+    heat: Heat,
+    /// Where the axes are at the end of what is planned.
+    states: States,
+    period_s: f64,
+}
+
+/// A stretch of a mark, as a track.
+#[derive(Clone, Debug)]
+pub(super) struct Stretch {
+    pub(super) path: Path,
+    pub(super) knots: Vec<Knot>,
+    /// Whole ticks to the stretch's end, if it ends on one; else it goes on for less than a tick.
+    pub(super) n_ticks: Option<u32>,
+}
+
+/// A track that is in the draft's tables, but not yet in its segments.
+#[derive(Clone, Copy)]
+pub(super) struct Laid {
+    motion: Motion,
+    n_ticks: u32,
+    starts: States,
+    ends: States,
+}
+
+impl<'a> Weave<'a> {
+    pub(super) fn new(
+        machine: &'a Machine,
+        inverse: &'a Inverse,
+        smoothing: &'a Smoothing,
+        fly_by: FlyBy<'a>,
+        heat: Heat,
+        draft: PlanDraft,
+    ) -> Self {
+        let states = [State::zeros(); 2];
+        let period_s = machine.output.period_s();
+        Self { machine, inverse, smoothing, fly_by, draft, n_samples: 0, heat, states, period_s }
+    }
+
+    /// Stays in the centre for so many ticks.
+    pub(super) fn rest_in_centre(&mut self, n_ticks: u32) {
+        self.draft.vertices.push(Point::ZERO);
+        let vertex = (self.draft.vertices.len() - 1) as u32;
+        self.push(None, n_ticks, Motion::Hold { vertex });
+        self.heat.cool(n_ticks);
+        self.states = [State::zeros(); 2];
+    }
+
+    /// Time of the mirrors at the end of what is planned, s: computed voltages act a tick after
+    /// their sample.
+    pub(super) fn now_s(&self) -> f64 {
+        (self.n_samples + 1) as f64 * self.period_s
+    }
+
+    pub(super) fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// Whether the motors stand these voltages from a state, with the heat they have.
+    pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States) -> bool {
+        self.fly_by.allows(voltages, from, &self.heat)
+    }
+
+    /// Puts a stretch into the tables.
+    ///
+    /// # Errors
+    /// If the optics do not reach a place of it, or it has too many samples.
+    pub(super) fn lay(&mut self, stretch: &Stretch, place: &str) -> Result<Laid, PlanError> {
+        let draft = &mut self.draft;
+        let first_vertex = draft.vertices.len() as u32;
+        draft.vertices.extend(&stretch.path.vertices);
+        let first_station = stretch.path.curved.then_some(draft.stations.len() as u32);
+        if stretch.path.curved {
+            draft.stations.extend(&stretch.path.stations);
+        }
+        let first_knot = draft.knots.len() as u32;
+        draft.knots.extend(&stretch.knots);
+        let motion = Motion::Track {
+            first_vertex,
+            n_vertices: stretch.path.vertices.len() as u32,
+            first_station,
+            first_knot,
+            n_knots: stretch.knots.len() as u32,
+            smoothing_ticks: self.smoothing.n_ticks,
+        };
+        let duration_s = time_at_s(&stretch.knots, stretch.path.length_mm());
+        let ticks = (duration_s / self.period_s - 1e-6).ceil().max(1.0);
+        if ticks > f64::from(u32::MAX) {
+            return Err(PlanError::TooLong { place: place.into(), value: ticks, limit: u32::MAX });
+        }
+        let n_ticks = stretch.n_ticks.unwrap_or(ticks as u32);
+        let starts = self.states_at(&motion, 0)?;
+        let ends = self.states_at(&motion, n_ticks)?;
+        Ok(Laid { motion, n_ticks, starts, ends })
+    }
+
+    /// The states of both axes at a tick of a track.
+    fn states_at(&self, motion: &Motion, tick: u32) -> Result<States, PlanError> {
+        let optics = &self.machine.optics;
+        let angles = |place: Point| {
+            angles_from_field(optics, place.into()).map(|angles| [angles.x_rad, angles.y_rad])
+        };
+        let around = angles_around(&self.draft, motion, tick, angles)
+            .map_err(|place| PlanError::Unreachable { x_mm: place.x, y_mm: place.y })?;
+        Ok(around.map(|angles| self.inverse.state(&angles).0))
+    }
+
+    /// Flies to where a track begins; `false` if there is no room for it.
+    ///
+    /// # Errors
+    /// If a program fails.
+    pub(super) fn fly_to(&mut self, laid: &Laid) -> Result<bool, PlanError> {
+        self.fly(laid.starts)
+    }
+
+    /// Flies to rest in the centre.
+    ///
+    /// # Errors
+    /// If a program fails.
+    pub(super) fn fly_home(&mut self) -> Result<bool, PlanError> {
+        self.fly([State::zeros(); 2])
+    }
+
+    fn fly(&mut self, to: States) -> Result<bool, PlanError> {
+        let Some(voltages) = self.fly_by.between(&self.states, &to, &self.heat)? else {
+            return Ok(false);
+        };
+        self.drive(None, &voltages);
+        self.states = to;
+        Ok(true)
+    }
+
+    /// Appends voltages.
+    pub(super) fn drive(&mut self, mark_index: Option<u32>, voltages: &Voltages) {
+        let first = self.draft.drives.len() as u32;
+        self.draft.drives.extend(voltages.iter().map(|pair| pair.map(|volts| volts as f32)));
+        self.push(mark_index, voltages.len() as u32, Motion::Drive { first });
+        for pair in voltages {
+            for axis in 0..2 {
+                self.states[axis] = self.fly_by.advance(&self.states[axis], pair[axis]);
+            }
+            self.heat.tick([self.states[0][CURRENT], self.states[1][CURRENT]]);
+        }
+    }
+
+    /// Appends a track that the axes are at the beginning of.
+    pub(super) fn follow(&mut self, mark_index: u32, laid: &Laid) {
+        self.push(Some(mark_index), laid.n_ticks, laid.motion);
+        self.heat.cool(laid.n_ticks);
+        self.states = laid.ends;
+    }
+
+    fn push(&mut self, mark_index: Option<u32>, n_ticks: u32, motion: Motion) {
+        self.draft.segments.push(Segment { mark_index, n_ticks, motion });
+        self.n_samples += u64::from(n_ticks);
+    }
+
+    /// Adds a mark with its light.
+    ///
+    /// * `light_s`: when light is to begin and end, s
+    /// * `powers`: power from times on, after the first one, s and W
+    pub(super) fn light(
+        &mut self,
+        mut mark: PlannedMark,
+        light_s: [f64; 2],
+        powers: &[(f64, f64)],
+    ) -> Result<(), PlanError> {
+        let laser = &self.machine.laser;
+        let edge = |time_s: f64, latency_ns: i64| (time_s * 1e9).round() as i64 - latency_ns;
+        let on_ns = edge(light_s[0], laser.on_latency_ns);
+        let off_ns = edge(light_s[1], laser.off_latency_ns);
+        if on_ns < 0 || off_ns < on_ns {
+            return Err(PlanError::EdgesReversed {
+                mark: self.draft.marks.len(),
+                origin: mark.source,
+                on_us: on_ns as f64 * 1e-3,
+                off_us: off_ns as f64 * 1e-3,
+            });
+        }
+        (mark.on_ns, mark.off_ns) = (on_ns as u64, off_ns as u64);
+        let mut power_w = mark.power_w;
+        for &(time_s, next_w) in powers {
+            let time_ns = edge(time_s, laser.on_latency_ns);
+            let changes = (next_w - power_w).abs() > POWER_STEP * power_w;
+            if changes && time_ns > on_ns && time_ns < off_ns {
+                power_w = next_w;
+                mark.steps.push(LaserEdge { time_ns: time_ns as u64, power_w });
+            }
+        }
+        self.draft.marks.push(mark);
+        Ok(())
+    }
+
+    /// Places of the beam at every tick of a track, from the first to the end.
+    pub(super) fn places(&self, laid: &Laid) -> Vec<Point> {
+        places(&self.draft, &laid.motion, laid.n_ticks)
+    }
+}
+
+impl Laid {
+    pub(super) fn n_ticks(&self) -> u32 {
+        self.n_ticks
+    }
+
+    pub(super) fn starts(&self) -> &States {
+        &self.starts
+    }
+
+    pub(super) fn ends(&self) -> &States {
+        &self.ends
+    }
+}
