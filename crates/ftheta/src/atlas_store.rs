@@ -124,7 +124,7 @@ fn key(scanner: &Scanner, axis: AxisOptions) -> AtlasKey {
     // Only what is held by the servo depends on it and on the torque constant's uncertainty.
     let held = match axis.model {
         Model::Held { .. } => Some((scanner.servo, scanner.kt_uncertainty)),
-        Model::Rigid | Model::Flexible | Model::Robust { .. } => None,
+        Model::Rigid | Model::Flexible | Model::Robust { .. } | Model::Closest { .. } => None,
     };
     AtlasKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}"))
 }

@@ -4,6 +4,7 @@
 //! lays, plans, audits and plays it on the digital twin, [`results::add`] writes what came of it.
 
 pub mod atlas_store;
+pub mod circle;
 pub mod convert;
 pub mod error;
 pub mod import;

@@ -9,7 +9,7 @@ use ftheta_model::job::Job;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, Planner};
 use ftheta_model::recipe::Recipe;
-use ftheta_model::trace::AxisStates;
+use ftheta_model::trace::{AxisStates, Trace};
 use ftheta_model::warning::{Imported, Warning};
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
@@ -211,6 +211,16 @@ pub fn play(
     options: &MarkOptions,
     observer: &mut dyn FnMut(Stage),
 ) -> Result<Played, Error> {
+    play_watched(plan, options, observer, &mut |_| {})
+}
+
+/// The same, with every stretch of the trace shown to `watch`.
+pub(crate) fn play_watched(
+    plan: &Plan,
+    options: &MarkOptions,
+    observer: &mut dyn FnMut(Stage),
+    watch: &mut dyn FnMut(&Trace),
+) -> Result<Played, Error> {
     let n_samples = plan.n_samples();
     let twin_options = TwinOptions {
         mismatch: options.mismatch,
@@ -236,6 +246,7 @@ pub fn play(
             observer(Stage::Play(block.first_index as f64 / n_samples as f64));
             let mut trace = twin.take_trace();
             scorer.add(&trace);
+            watch(&trace);
             states.append(&mut trace.states);
         }
         n_blocks += 1;
@@ -243,6 +254,7 @@ pub fn play(
     }
     let mut trace = twin.take_trace();
     scorer.add(&trace);
+    watch(&trace);
     states.append(&mut trace.states);
     observer(Stage::Finish);
     Ok(Played { score: scorer.finish(), dose: twin.into_dose(), states })

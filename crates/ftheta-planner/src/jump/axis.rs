@@ -272,7 +272,16 @@ impl Axis {
     ) -> Result<Option<Vec<f64>>, JumpError> {
         let start = State::new(0.0, ask.from_rad_s, 0.0, 0.0, 0.0);
         let end = State::new(ask.distance_rad, ask.to_rad_s, 0.0, 0.0, 0.0);
-        let ends = Ends { start, end, place: true };
+        self.pass(Ends { start, end, place: true }, way, n_ticks)
+    }
+
+    /// The same between any states.
+    pub(super) fn pass(
+        &self,
+        ends: Ends,
+        way: Way,
+        n_ticks: usize,
+    ) -> Result<Option<Vec<f64>>, JumpError> {
         let request = Request { n_ticks, ends, goal: Goal::Farthest, way };
         let found = self.best(&request)?.filter(|(factor, _)| *factor >= 1.0);
         Ok(found.map(|(factor, mut voltages_v)| {
