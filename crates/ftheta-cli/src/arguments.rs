@@ -72,6 +72,9 @@ pub struct Mark {
     /// How planned marks take corners; chosen for each one if not given.
     #[arg(long, value_enum)]
     pub corner: Option<CornerName>,
+    /// Plan the job as classic too, with tuned delays and with skywriting, and compare.
+    #[arg(long, value_enum, value_name = "PLANNER")]
+    pub against: Option<AgainstName>,
     /// Part of the voltage that planned jumps keep for the servo's feedback, 0 to 0.9.
     #[arg(long, value_name = "R", default_value = "0.12", value_parser = reserve)]
     pub reserve: f64,
@@ -284,6 +287,12 @@ impl From<PlannerName> for Planner {
             PlannerName::Classic => Self::Classic,
         }
     }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum AgainstName {
+    /// The classic planner, its delays tuned to the tolerance.
+    Classic,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -2,10 +2,12 @@
 
 use crate::screen::say;
 use ftheta::Fault;
+use ftheta::against::{Against, WAYS};
 use ftheta::mark::{Marked, PlanTimes};
 use ftheta::model::warning::Warning;
 use ftheta::physics::audit::Limits;
 use ftheta::physics::plan::Plan;
+use ftheta::planner::classic::Settings;
 use ftheta::report::score::Score;
 use serde_json::{Value, json};
 
@@ -49,6 +51,47 @@ pub fn marked(
         "stages_s": object(stages),
         "seed": marked.seed,
         "warnings": warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
+}
+
+/// The job by the classic planner as an object: that of the first way, and all of them.
+///
+/// * `duration_s`: of the job on the twin, that they are compared with
+pub fn against(against: &Against, duration_s: f64) -> Value {
+    let columns: Vec<Value> = against
+        .columns
+        .iter()
+        .map(|column| {
+            column.as_ref().map_or(Value::Null, |column| {
+                json!({
+                    "plan": plan(&column.plan, &column.times),
+                    "twin": twin(&column.score),
+                    "delays": delays(&column.settings),
+                    "speedup": column.score.duration_s / duration_s,
+                })
+            })
+        })
+        .collect();
+    let keys = ["plan", "twin", "delays", "speedup"];
+    let mut object: Value =
+        keys.iter().map(|&key| (key.to_owned(), columns[0][key].clone())).collect();
+    let named = WAYS.iter().map(|way| way.key.to_owned()).zip(columns);
+    object["columns"] = named.collect();
+    object
+}
+
+fn delays(settings: &Settings) -> Value {
+    // Whole steps of the tuning; what the conversion leaves is dropped.
+    let us = |time_s: f64| (time_s * 1e9).round() * 1e-3;
+    json!({
+        "jump_speed_mm_s": settings.jump_speed_mm_s,
+        "jump_delay_us": us(settings.jump_delay_s),
+        "mark_delay_us": us(settings.mark_delay_s),
+        "polygon_delay_us": us(settings.polygon_delay_s),
+        "laser_on_delay_us": settings.laser_on_delay_ns as f64 * 1e-3,
+        "laser_off_delay_us": settings.laser_off_delay_ns as f64 * 1e-3,
+        "sky_run_in_us": us(settings.sky_run_in_s),
+        "sky_run_out_us": us(settings.sky_run_out_s),
     })
 }
 

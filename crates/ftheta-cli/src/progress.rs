@@ -31,6 +31,7 @@ impl Progress {
             Stage::Audit => ("audit", 0.0),
             Stage::Play(share) => ("play", share),
             Stage::Finish => ("finish", 1.0),
+            Stage::Tune(share) => ("tune", share),
         };
         self.enter(name);
         if self.bar.is_none() && std::io::stderr().is_terminal() && self.total() > PATIENCE {

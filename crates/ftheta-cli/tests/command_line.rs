@@ -117,6 +117,35 @@ fn mark_writes_its_files_and_one_object() {
 }
 
 #[test]
+fn mark_against_classic_compares_and_a_second_run_gives_the_same_bytes() {
+    let bench = Bench::new();
+    bench.write("frame.svg", DRAWING);
+    let mut pages = Vec::new();
+    let mut objects = Vec::new();
+    for out in ["first", "second"] {
+        let arguments =
+            ["mark", "frame.svg", "--against", "classic", "--cache", "kept", "--out", out];
+        let (code, value) = bench.json(&arguments);
+        assert_eq!(code, 0, "{value}");
+        pages.push(fs::read_to_string(bench.path(out).join("report.html")).unwrap());
+        objects.push(value["against"].clone());
+    }
+    assert_eq!(objects[0], objects[1]);
+    assert!(pages[0] == pages[1], "reports differ");
+    let against = &objects[0];
+    assert!(pages[0].contains("Against the classic planner"));
+    for key in ["plan", "twin", "delays", "speedup"] {
+        assert_eq!(against[key], against["columns"]["a"][key], "{key}");
+    }
+    assert!(number(against, &["twin", "contour_error_um", "max"]) <= 10.0);
+    assert!(number(against, &["columns", "b", "twin", "coverage_error_um", "max"]) <= 10.0);
+    assert!(number(against, &["columns", "sky_a", "delays", "sky_run_in_us"]) > 0.0);
+    assert!(number(against, &["speedup"]) > 0.5);
+    let refused = bench.run(&["mark", "frame.svg", "--against", "optimal"]);
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
 fn shapes_outside_the_field_are_named_or_clipped() {
     let bench = Bench::new();
     bench.write("frame.svg", DRAWING.replace("x=\"5\"", "x=\"95\""));

@@ -1,14 +1,10 @@
 //! Atlas files: solved jumps, kept between runs; binary, with a checksum over everything.
 
+use crate::cache_key::{CacheKey, N_DIGEST};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
 const HEADER: &[u8] = b"ftheta-atlas 1\n";
-const N_DIGEST: usize = 32;
-
-/// Which machine and settings an atlas is for: a hash of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AtlasKey([u8; N_DIGEST]);
 
 /// One level: for every number of ticks from zero the step and as many voltages.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,21 +30,8 @@ pub enum AtlasFileError {
     Key,
 }
 
-impl AtlasKey {
-    /// The key of what decides the atlas, as text.
-    pub fn of(text: &str) -> Self {
-        Self(Sha256::digest(text).into())
-    }
-
-    /// The name of the file: the beginning of the key.
-    pub fn file_name(&self) -> String {
-        let digits: String = self.0[..8].iter().map(|byte| format!("{byte:02x}")).collect();
-        format!("{digits}.atlas")
-    }
-}
-
 /// An atlas as bytes.
-pub fn write(key: AtlasKey, levels: &[AtlasLevel]) -> Vec<u8> {
+pub fn write(key: CacheKey, levels: &[AtlasLevel]) -> Vec<u8> {
     let mut out = HEADER.to_vec();
     out.extend(key.0);
     out.extend((levels.len() as u32).to_le_bytes());
@@ -66,7 +49,7 @@ pub fn write(key: AtlasKey, levels: &[AtlasLevel]) -> Vec<u8> {
 ///
 /// # Errors
 /// If it is damaged, of another version, or not for this key.
-pub fn read(bytes: &[u8], key: AtlasKey) -> Result<Vec<AtlasLevel>, AtlasFileError> {
+pub fn read(bytes: &[u8], key: CacheKey) -> Result<Vec<AtlasLevel>, AtlasFileError> {
     if !bytes.starts_with(HEADER) {
         return Err(AtlasFileError::Header);
     }
@@ -121,12 +104,12 @@ impl<'a> Rest<'a> {
 mod tests {
     use super::*;
 
-    fn example() -> (AtlasKey, Vec<AtlasLevel>) {
+    fn example() -> (CacheKey, Vec<AtlasLevel>) {
         let level = |step: f64| AtlasLevel {
             steps_rad: vec![0.0, 0.0, step],
             sequences_v: vec![vec![], vec![0.0], vec![step, -1.0 / 3.0]],
         };
-        (AtlasKey::of("S10"), vec![level(1e-7), AtlasLevel::default(), level(0.25)])
+        (CacheKey::of("S10"), vec![level(1e-7), AtlasLevel::default(), level(0.25)])
     }
 
     #[test]
@@ -145,7 +128,7 @@ mod tests {
             flipped[n_bytes] ^= 0x10;
             assert!(read(&flipped, key).is_err(), "flipped {n_bytes}");
         }
-        assert_eq!(read(&whole, AtlasKey::of("S14")), Err(AtlasFileError::Key));
+        assert_eq!(read(&whole, CacheKey::of("S14")), Err(AtlasFileError::Key));
         assert_eq!(read(b"ftheta-atlas 0\n", key), Err(AtlasFileError::Header));
     }
 

@@ -1,6 +1,8 @@
 //! File syntax of ftheta: SVG drawings, machine and recipe files, plan files.
 
 pub mod atlas_file;
+pub mod cache_key;
+pub mod delays_file;
 pub mod machine;
 pub mod mechanism;
 pub mod motion_law;

@@ -80,5 +80,7 @@ fn classic(section: &Section<'_>) -> Result<ClassicRecipe, TomlError> {
         interpolation: section.choice("interpolation", &kinds)?,
         acceleration_mm_s2: section.number("acceleration_mm_s2", 1.0..=1e12)?,
         deceleration_mm_s2: section.number("deceleration_mm_s2", 1.0..=1e12)?,
+        sky_run_in_s: seconds("sky_run_in_us")?,
+        sky_run_out_s: seconds("sky_run_out_us")?,
     })
 }

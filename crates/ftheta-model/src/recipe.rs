@@ -86,6 +86,11 @@ pub struct ClassicRecipe {
     pub acceleration_mm_s2: Option<f64>,
     /// Deceleration at the end of a mark, mm/s²; `None` is constant speed to the end.
     pub deceleration_mm_s2: Option<f64>,
+    /// Skywriting: how long the beam runs at mark speed before a leg, s; `None` is 0. Either run
+    /// above 0 turns skywriting on.
+    pub sky_run_in_s: Option<f64>,
+    /// Skywriting: how long the beam runs on at mark speed after a leg, s; `None` is 0.
+    pub sky_run_out_s: Option<f64>,
 }
 
 /// How a vector becomes micro-steps.

@@ -3,6 +3,7 @@
 //! Small, separate, and without the planner's code: it walks the segments by itself, takes every
 //! sample through the exact optics and the nominal servo and motor, and looks at what comes out.
 
+mod beam;
 mod light;
 mod structure;
 mod track;
@@ -13,9 +14,10 @@ use crate::follow::Inverse;
 use crate::galvo::{CURRENT, Galvo, State};
 use crate::optics::{angles_from_field, scale_mm_per_rad};
 use crate::servo::{Gains, ServoError};
-use ftheta_model::machine::Machine;
+use beam::Beam;
+use ftheta_model::machine::{Drive, Machine};
 use ftheta_model::plan::PlanDraft;
-use ftheta_model::space::FieldPoint;
+use ftheta_model::space::{FieldPoint, MirrorAngles};
 use thiserror::Error;
 use walk::{Command, Walk};
 
@@ -161,6 +163,9 @@ pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
     light::check_light(draft, gains.lag_s(&galvo))?;
     let mut walk = Walk::new(draft, gains, inverse.as_ref());
     let mut meter = Meter::new(draft, gains);
+    let known = invertible && draft.machine.output.drive != Drive::BlackBox;
+    let mut beam = Beam::new(draft, known);
+    let period_ns = f64::from(draft.machine.output.period_ns);
     let gap_max_rad = draft.tolerance_mm / scale_mm_per_rad(&draft.machine.optics);
     while let Some((command, segment_index)) = walk.next() {
         let gap_rad = walk.gap_rad();
@@ -171,6 +176,8 @@ pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
             return Err(AuditError::Limit { place, quantity, value, limit, unit: "rad" });
         }
         meter.sample(draft, command, segment_index)?;
+        // The samples before this one have moved the mirrors to the end of its tick.
+        beam.sample(meter.n_samples as f64 * period_ns, meter.angles())?;
     }
     Ok(meter.limits)
 }
@@ -201,6 +208,12 @@ impl Meter {
             n_samples: 0,
             limits: Limits::default(),
         }
+    }
+
+    /// The mirrors now.
+    fn angles(&self) -> MirrorAngles {
+        let [x_rad, y_rad] = [0, 1].map(|axis| self.angle_row.dot(self.axes[axis].state()));
+        MirrorAngles { x_rad, y_rad }
     }
 
     fn sample(

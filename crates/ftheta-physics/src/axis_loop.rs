@@ -113,8 +113,8 @@ pub fn spectral_radius(plant: &Galvo, gains: &Gains, tick_s: f64) -> f64 {
     values.iter().map(|value| value.norm()).fold(0.0, f64::max)
 }
 
-/// The mirror's angle at the ticks per reference of a frequency, in the steady state without limits;
-/// `None` where the loop does not answer with one.
+/// The mirror's angle at the ticks per reference of a frequency, in the steady state without
+/// limits; `None` where the loop does not answer with one.
 ///
 /// # Accuracy
 /// S10 with a lag of 164.19 µs at 10 µs, 318.3 Hz: 0.9903, -18.78° (`design/control.md` E).

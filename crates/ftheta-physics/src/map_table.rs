@@ -3,14 +3,17 @@
 //! The exact optics cost about 180 ns a point. Where a sample is due every few tens of
 //! nanoseconds, the same map is read from a table made once from the exact one.
 
+use std::sync::Arc;
+
 /// A table of a map from two coordinates to two values, within a square around zero.
+/// Clones share it.
 #[derive(Clone, Debug)]
 pub struct MapTable {
     half_width: f64,
     cells_per_unit: f64,
     n_cells: usize,
     /// Per node both values, and their slopes by u, by v and by both, in cells.
-    nodes: Vec<[f64; 8]>,
+    nodes: Arc<[[f64; 8]]>,
     /// Within this many cells of the centre the caller's exact map is to be used.
     exact_below: f64,
 }
@@ -46,7 +49,7 @@ impl MapTable {
             half_width,
             cells_per_unit,
             n_cells: N_CELLS,
-            nodes,
+            nodes: nodes.into(),
             exact_below: exact_cells * cell - f64::MIN_POSITIVE,
         })
     }

@@ -1,7 +1,7 @@
 //! From vectors to segments: marks and jumps at constant speed with a classic controller's delays.
 
 use crate::PlanError;
-use crate::classic::{Settings, check_pen};
+use crate::classic::{Settings, check_pen, legs};
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, PlannedMark, Planner, Segment, SpeedProfile};
 use ftheta_model::recipe::{Interpolation, Pen};
@@ -38,6 +38,10 @@ pub(crate) fn draft(
     builder.hold(None, settings.lead_in_s(builder.period_s))?;
     for mark in toolpath.marks {
         let pen = &toolpath.pens[mark.pen_index];
+        if settings.skywriting() {
+            builder.skywrite(mark, pen)?;
+            continue;
+        }
         builder.jump_to(mark.start())?;
         builder.mark(mark, pen)?;
         builder.hold(None, settings.mark_delay_s)?;
@@ -117,7 +121,11 @@ impl Builder<'_> {
             first_vertex,
             n_vertices: last_vertex - first_vertex + 1,
             profile,
-            interpolation: self.settings.interpolation,
+            // A DDA cannot follow a leg's vertices without a stop.
+            interpolation: match self.settings.skywriting() {
+                true => Interpolation::Absolute,
+                false => self.settings.interpolation,
+            },
         };
         // Rounding must not add a tick to a time that is a whole number of them.
         let n_ticks = (duration_s / self.period_s - 1e-6).ceil().max(1.0);
@@ -178,6 +186,65 @@ impl Builder<'_> {
             run = Run { first_vertex: last_vertex, length_mm: 0.0 };
         }
         self.push_light(mark, pen, start_s, end_s)
+    }
+
+    /// Marks every leg at full speed from end to end, running in before it and on after it.
+    fn skywrite(&mut self, mark: Mark, pen: &Pen) -> Result<(), PlanError> {
+        let (settings, period_s) = (self.settings, self.period_s);
+        let legs =
+            legs(mark, |from, at, to| settings.polygon_delay_for_s(from, at, to) >= period_s);
+        legs.into_iter().try_for_each(|leg| self.leg(leg, pen))
+    }
+
+    fn leg(&mut self, leg: Mark, pen: &Pen) -> Result<(), PlanError> {
+        let mark_index = Some(self.marks.len() as u32);
+        let tick_mm = pen.mark_speed_mm_s * self.period_s;
+        let n_ticks = |time_s: f64| (time_s / self.period_s).round();
+        let (n_in, n_out) =
+            (n_ticks(self.settings.sky_run_in_s), n_ticks(self.settings.sky_run_out_s));
+        let points = &leg.points;
+        let n = points.len();
+        let ahead = (points[1] - points[0]).normalize();
+        self.jump_to(points[0] - ahead * (n_in * tick_mm))?;
+        self.run(None, &points[..1], pen)?;
+        let start_s = self.now_s();
+        let length_mm =
+            self.vertices[self.last_vertex() as usize].distance(points[0]) + leg.length_mm();
+        let end_s = start_s + length_mm / pen.mark_speed_mm_s;
+        // A leg goes on for the rest of its last tick, so that the run-out takes whole ones.
+        let rest_mm = (length_mm / tick_mm - 1e-6).ceil().max(1.0) * tick_mm - length_mm;
+        let beyond = (points[n - 1] - points[n - 2]).normalize();
+        let mut path = points[1..].to_vec();
+        if rest_mm > SAME_PLACE_MM {
+            path.push(points[n - 1] + beyond * rest_mm);
+        }
+        self.run(mark_index, &path, pen)?;
+        let from = self.vertices[self.last_vertex() as usize];
+        self.run(None, &[from + beyond * (n_out * tick_mm)], pen)?;
+        self.push_light(leg, pen, start_s, end_s)
+    }
+
+    /// Follows `points` from the last vertex at the pen's speed.
+    fn run(
+        &mut self,
+        mark_index: Option<u32>,
+        points: &[Point],
+        pen: &Pen,
+    ) -> Result<(), PlanError> {
+        let first_vertex = self.last_vertex();
+        let mut from = self.vertices[first_vertex as usize];
+        let mut length_mm = 0.0;
+        for &point in points {
+            length_mm += from.distance(point);
+            self.vertices.push(point);
+            from = point;
+        }
+        if length_mm <= SAME_PLACE_MM {
+            self.vertices.truncate(first_vertex as usize + 1);
+            return Ok(());
+        }
+        let profile = constant_speed(length_mm, pen.mark_speed_mm_s);
+        self.travel(mark_index, (first_vertex, self.last_vertex()), profile).map(|_| ())
     }
 
     fn push_light(

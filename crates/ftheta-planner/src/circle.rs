@@ -16,16 +16,14 @@ use ftheta_physics::audit::CORRECTION_RESERVE;
 use ftheta_physics::galvo::State;
 use ftheta_physics::optics::scale_mm_per_rad;
 use harmonics::{Harmonics, States};
-use kurbo::{Point, Shape, Vec2};
+use kurbo::{Point, Vec2};
 
-/// Distance of the stored curve from the true one, mm: what a trace resolves.
-const CURVE_MM: f64 = 1e-6;
 /// Ticks at rest in the centre after everything.
 const N_TICKS_LAST: u32 = 2;
 /// Part of the tolerance by which a mirror may be off after a run-in, on any motor within the
 /// machine file's uncertainties.
 const HELD_SHARE: f64 = 0.5;
-/// Where on a turn a run-in may end; the one that takes the fewest ticks is taken.
+/// Where on a turn a run-in may end, a power of two; the one that takes the fewest ticks is taken.
 const N_STARTS: u32 = 8;
 
 /// In the field's centre.
@@ -117,7 +115,7 @@ pub fn draft(
     let edge_ns =
         |light_s: f64, latency_ns: i64| ((light_s * 1e9).round() as i64 - latency_ns) as u64;
     let mark = PlannedMark {
-        curve: kurbo::Ellipse::new(ellipse.centre, ellipse.radii_mm, 0.0).to_path(CURVE_MM),
+        curve: ellipse.curve(start),
         pen_index: 0,
         source: "circle".into(),
         on_ns: edge_ns(on_s, laser.on_latency_ns),

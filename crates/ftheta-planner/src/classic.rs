@@ -3,6 +3,7 @@
 //! Every vector is cut into micro-steps at constant speed. The mirrors lag behind, so the
 //! controller waits: after jumps, after marks, in corners; and it shifts the laser's edges.
 
+mod legs;
 mod settings;
 
 use crate::{PlanError, builder};
@@ -10,6 +11,7 @@ use ftheta_model::machine::Machine;
 use ftheta_model::plan::PlanDraft;
 use ftheta_model::toolpath::Toolpath;
 use ftheta_physics::plan::Plan;
+pub(crate) use legs::legs;
 pub use settings::Settings;
 pub(crate) use settings::check_pen;
 

@@ -5,6 +5,7 @@
 //! allow. The mirrors arrive at its first place with its speed, and leave its last place with it.
 
 mod fly_by;
+mod glide;
 mod heat;
 mod marking;
 mod path;
@@ -25,11 +26,12 @@ use ftheta_physics::follow::Inverse;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::angles_from_field;
 use ftheta_physics::servo::Gains;
+use glide::Glide;
 use heat::Heat;
 use kurbo::Point;
 use marking::Marking;
 use smoothing::Smoothing;
-use weave::Weave;
+use weave::{Mover, Weave};
 
 /// How much of the machine planned motion may use: how much the servo's answer needs besides is
 /// seen when the plan is audited.
@@ -53,6 +55,9 @@ pub const RESTRAINTS: [Restraint; 4] = [
 
 /// Rest before the first motion and after the last, ticks.
 const N_REST_TICKS: u32 = 4;
+
+/// Ways at mark speed before and after light, for a servo that is not known, in its lags.
+const RUN_LAGS: [f64; 2] = [2.5, 1.0];
 
 /// How corners are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,29 +98,37 @@ pub struct OptimalOptions {
     pub restraint: Restraint,
 }
 
-/// Why motion of this machine cannot be planned by voltage, if it cannot.
-pub fn obstacle(machine: &Machine) -> Option<&'static str> {
-    match (machine.output.drive, machine.scanner.servo) {
-        (Drive::BlackBox, _) => Some("the drive is a black box: what its servo does is not known"),
-        (_, Servo::Pid { .. }) => Some("the memory of a PID servo would outlast the jump"),
-        (_, Servo::StateFeedback { .. }) => None,
-    }
+/// What a machine lets one know of its servo, and so how its mirrors are moved.
+#[derive(Clone, Copy, Debug)]
+pub enum Motions<'a> {
+    /// By voltages, through the inverse of a servo that is known.
+    Known {
+        /// Of this machine's scanner and period, with an atlas that reaches as far as
+        /// [`longest_step_rad`].
+        transitions: &'a Transitions,
+        /// Of the same.
+        corners: &'a Corners,
+    },
+    /// By angles, which the servo follows after its lag.
+    Lag,
+}
+
+/// Whether commands can be computed from voltages.
+pub fn is_servo_known(machine: &Machine) -> bool {
+    let feedback = matches!(machine.scanner.servo, Servo::StateFeedback { .. });
+    feedback && machine.output.drive != Drive::BlackBox
 }
 
 /// The content of a plan, before the audit.
 ///
 /// The beam starts and ends in the field centre.
 ///
-/// * `transitions`: of this machine's scanner and period, with an atlas that reaches as far as
-///   [`longest_step_rad`]
-/// * `corners`: of the same; without them corners are averaged at lower speed
-///
 /// # Errors
 /// If a pen is out of the machine's range, a mark cannot be reached, or a program fails.
 pub fn draft(
     toolpath: Toolpath,
     machine: &Machine,
-    (transitions, corners): (&Transitions, Option<&Corners>),
+    motions: Motions<'_>,
     options: &OptimalOptions,
 ) -> Result<PlanDraft, PlanError> {
     if toolpath.marks.is_empty() {
@@ -126,10 +139,21 @@ pub fn draft(
     let tick_s = machine.output.period_s();
     let gains = Gains::design(&machine.scanner, tick_s)?;
     let inverse = Inverse::new(&galvo, &gains, tick_s).ok_or(PlanError::Immovable)?;
-    let smoothing = Smoothing::new(machine, &galvo, &gains, &inverse);
+    let lag_s = gains.lag_s(&galvo);
+    let mut smoothing = Smoothing::new(machine, &galvo, &gains, &inverse);
     let Restraint { heat_share, current_reserve, .. } = options.restraint;
-    let current_max_a = (1.0 - 0.5 * current_reserve) * machine.scanner.current_max_a;
-    let fly_by = FlyBy::new(transitions, machine, gains, options.voltage_reserve, current_max_a);
+    let (mover, corners) = match motions {
+        Motions::Known { transitions, corners } => {
+            let current_max_a = (1.0 - 0.5 * current_reserve) * machine.scanner.current_max_a;
+            let reserve = options.voltage_reserve;
+            let fly_by = FlyBy::new(transitions, machine, gains, reserve, current_max_a);
+            (Mover::Voltage(fly_by), Some(corners))
+        }
+        Motions::Lag => {
+            smoothing = smoothing.with_servo(lag_s);
+            (Mover::Angle(Glide::new(machine, lag_s), lag_s), None)
+        }
+    };
     let Toolpath { pens, marks } = toolpath;
     let draft = PlanDraft {
         machine: machine.clone(),
@@ -144,8 +168,9 @@ pub fn draft(
         segments: Vec::new(),
     };
     let heat = Heat::new(machine, heat_share);
-    let weave = Weave::new(machine, &inverse, &smoothing, fly_by, heat, draft);
-    let mut marking = Marking { weave, options, corners, galvo };
+    let weave = Weave::new(machine, &inverse, &smoothing, mover, heat, draft);
+    let run_s = RUN_LAGS.map(|lags| if corners.is_some() { 0.0 } else { lags * lag_s });
+    let mut marking = Marking { weave, options, corners, galvo, run_s };
     marking.weave.rest_in_centre(N_REST_TICKS);
     for mark in marks {
         marking.mark(mark)?;
@@ -153,7 +178,7 @@ pub fn draft(
     if !marking.weave.fly_home()? {
         return Err(PlanError::NoRoom { place: "the way back to the centre".into() });
     }
-    marking.weave.rest_in_centre(lead_out_ticks(machine));
+    marking.weave.rest_in_centre(lead_out_ticks(machine, lag_s));
     Ok(marking.weave.draft)
 }
 
@@ -175,7 +200,7 @@ pub fn longest_step_rad(toolpath: &Toolpath, machine: &Machine) -> f64 {
 }
 
 /// Rest at the end: until light has ended, and the mirrors have come to rest.
-fn lead_out_ticks(machine: &Machine) -> u32 {
-    let latency_s = machine.laser.off_latency_ns.max(0) as f64 * 1e-9;
-    N_REST_TICKS + 50 + (latency_s / machine.output.period_s()).ceil() as u32
+fn lead_out_ticks(machine: &Machine, lag_s: f64) -> u32 {
+    let wait_s = 3.0 * lag_s + machine.laser.off_latency_ns.max(0) as f64 * 1e-9;
+    N_REST_TICKS + (wait_s / machine.output.period_s()).ceil() as u32
 }

@@ -52,9 +52,13 @@ struct Cursor {
 impl<'a> Renderer<'a> {
     /// Starts before the first sample.
     pub fn new(plan: &'a Plan) -> Self {
+        Self::with_words(plan, Words::new(plan))
+    }
+
+    fn with_words(plan: &'a Plan, words: Words<'a>) -> Self {
         let mut renderer = Self {
             plan,
-            words: Words::new(plan),
+            words,
             axes: Axes::new(&plan.machine),
             segment_index: 0,
             n_rendered: 0,
@@ -79,6 +83,12 @@ impl<'a> Renderer<'a> {
             }
             self.track = Track::new(self.plan, &segment.motion);
         }
+    }
+
+    /// Starts before the first sample of another plan for the same machine, and saves making the
+    /// table of its optics again.
+    pub fn for_plan<'b>(&self, plan: &'b Plan) -> Renderer<'b> {
+        Renderer::with_words(plan, self.words.for_plan(plan))
     }
 
     /// Fills `block` with what comes next; `false` after the end.

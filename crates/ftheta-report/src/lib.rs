@@ -9,6 +9,7 @@ mod axes_view;
 mod bars;
 mod cards;
 mod chart;
+pub mod comparison;
 mod contour;
 mod coverage;
 mod field_view;

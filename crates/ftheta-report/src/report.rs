@@ -3,6 +3,7 @@
 use crate::axes_view::curves;
 use crate::bars::{dose_svg, limits_svg, split_html};
 use crate::cards::cards;
+use crate::comparison::{Rival, comparison};
 use crate::field_view::{error_legend_svg, errors_svg, marks_svg, pens_html};
 use crate::score::Score;
 use crate::text::{escaped, number, put};
@@ -38,6 +39,8 @@ pub struct ReportInput<'a> {
     pub times: TimeSplit,
     /// Laser, delays and other settings: what, and its value with unit.
     pub settings: &'a [(String, String)],
+    /// The same job planned in other ways, if it was; shown beside this one.
+    pub against: &'a [Rival<'a>],
     /// What was ignored or changed on the way.
     pub warnings: &'a [Warning],
     /// The plate picture as PNG, best 1 200 pixels; left out where empty or above 1.4 MB.
@@ -76,6 +79,7 @@ pub fn report_html(input: &ReportInput<'_>) -> String {
     fields(&mut out, input);
     distributions(&mut out, input);
     curves(&mut out, input.plan, input.states);
+    comparison(&mut out, input);
     tables(&mut out, input);
     warnings(&mut out, input.warnings);
     out.push_str(

@@ -11,6 +11,7 @@ use ftheta_model::space::FieldPoint;
 use ftheta_model::trace::{AxisStates, Light, Trace, TracePoint};
 use ftheta_model::warning::Warning;
 use ftheta_physics::audit::Limits;
+use ftheta_report::comparison::Rival;
 use ftheta_report::plate::{PlateOptions, plate_png};
 use ftheta_report::report::{ReportInput, TimeSplit, report_html};
 use ftheta_report::score::score;
@@ -177,6 +178,10 @@ fn html() -> (String, Vec<u8>) {
         states: &run.trace.states,
         times: TimeSplit { mark_s: 0.95, jump_s: 0.21, delay_s: 0.08 },
         settings: &settings,
+        against: &[
+            Rival { name: "delays <A>", score: Some(&found), settings: settings[1..].to_vec() },
+            Rival { name: "delays B", score: None, settings: Vec::new() },
+        ],
         warnings: &[Warning::new("#text7", "has no outline & was left out")],
         plate_png: &plate_png,
     };
@@ -199,6 +204,9 @@ fn the_report_is_self_contained_safe_and_bounded() {
     assert!(page.contains("rosette &lt;/script&gt;&lt;b&gt;&amp;&quot;&#39;"));
     assert!(page.contains("#petal5 &lt;script&gt;"));
     assert!(page.contains("data:image/png;base64,"));
+    // Its own score as its rival: the same time, and dashes where nothing keeps the tolerance.
+    assert!(page.contains("<th class=n>delays &lt;A&gt;<th class=n>delays B"));
+    assert!(page.contains("of classic</td><td class=n>1</td><td class=n>1</td><td class=n>–</td>"));
     assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
 }
 
@@ -227,6 +235,7 @@ fn an_empty_run_still_has_a_report() {
         states: &[],
         times: TimeSplit::default(),
         settings: &[],
+        against: &[],
         warnings: &[],
         plate_png: &[],
     });

@@ -18,6 +18,7 @@ use rand_xoshiro::rand_core::SeedableRng;
 const STEP_MAX_NS: u32 = 2000;
 
 /// Two axes, their sensors, and the optics behind them.
+#[derive(Clone)]
 pub struct Beam {
     axes: [AxisLoop; 2],
     /// Mirror angle at each sub-step of a tick from the states at its start and the voltage.

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 type Tile = Box<[f32; TILE_PIXELS * TILE_PIXELS]>;
 
 /// Energy per pixel of an infinitely thin beam, in sparse tiles.
+#[derive(Clone)]
 pub struct Exposure {
     pixel_mm: f64,
     pixels_per_mm: f64,

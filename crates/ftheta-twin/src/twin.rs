@@ -39,7 +39,8 @@ pub enum TwinError {
     },
 }
 
-/// A machine in the computer.
+/// A machine in the computer. A clone goes on from the same state; the tables are shared.
+#[derive(Clone)]
 pub struct Twin {
     beam: Beam,
     laser: LaserState,

@@ -1,7 +1,8 @@
-//! Jump atlases kept on disk between runs, one file for each machine and setting.
+//! Jump atlases and tuned delays kept on disk between runs, one file for each machine and setting.
 
 use crate::Error;
-use ftheta_formats::atlas_file::{self, AtlasKey, AtlasLevel};
+use ftheta_formats::atlas_file::{self, AtlasLevel};
+use ftheta_formats::cache_key::CacheKey;
 use ftheta_model::machine::Scanner;
 use ftheta_model::warning::Warning;
 use ftheta_planner::jump::{ATLAS_VERSION, Atlas, AxisOptions, Level, Model};
@@ -10,7 +11,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// The folder that atlases are kept in; without one they are built anew each time.
+/// The folder that they are kept in; without one they are made anew each time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AtlasStore {
     folder: Option<PathBuf>,
@@ -40,31 +41,22 @@ impl AtlasStore {
         warnings: &mut Vec<Warning>,
     ) -> Result<Atlas, Error> {
         let mut levels: [Level; _] = Default::default();
-        if let Some(path) = self.path(scanner, axis) {
-            match read(&path, key(scanner, axis)) {
-                Ok(kept) => levels.iter_mut().zip(kept).for_each(|(level, kept)| {
-                    let AtlasLevel { steps_rad, sequences_v } = kept;
-                    *level = Level { steps_rad, sequences_v };
-                }),
-                Err(None) => {}
-                Err(Some(why)) => warnings.push(Warning::new(
-                    "atlas",
-                    format!("{}: {why}; the atlas is built anew", path.display()),
-                )),
-            }
-        }
+        let key = key(scanner, axis);
+        let kept = self.read(&key.file_name("atlas"), "atlas", warnings, |bytes| {
+            atlas_file::read(bytes, key).map_err(|error| error.to_string())
+        });
+        levels.iter_mut().zip(kept.unwrap_or_default()).for_each(|(level, kept)| {
+            let AtlasLevel { steps_rad, sequences_v } = kept;
+            *level = Level { steps_rad, sequences_v };
+        });
         Ok(Atlas::restore(scanner, axis, levels)?)
     }
 
-    /// Keeps an atlas. It is written beside its place and renamed, so that a reader finds all of it
-    /// or none, whoever writes at the same time; of two writers the last one stays.
+    /// Keeps an atlas.
     ///
     /// A folder that cannot be written to costs time in the next run, nothing else: a warning.
     pub fn save(&self, atlas: &Atlas, warnings: &mut Vec<Warning>) {
-        let (scanner, axis) = (atlas.scanner(), atlas.axis_options());
-        let (Some(folder), Some(path)) = (&self.folder, self.path(scanner, axis)) else {
-            return;
-        };
+        let key = key(atlas.scanner(), atlas.axis_options());
         let levels: Vec<AtlasLevel> = atlas
             .levels()
             .iter()
@@ -73,29 +65,47 @@ impl AtlasStore {
                 sequences_v: sequences_v.clone(),
             })
             .collect();
-        let bytes = atlas_file::write(key(scanner, axis), &levels);
-        if let Err(error) = publish(folder, &path, &bytes) {
-            let warning =
-                Warning::new("atlas", format!("{}: cannot be kept: {error}", path.display()));
+        let bytes = atlas_file::write(key, &levels);
+        self.write(&key.file_name("atlas"), "atlas", warnings, &bytes);
+    }
+
+    /// What a kept file holds; one that cannot be used is as good as none, with a warning.
+    ///
+    /// * `what` it is, for the warning
+    /// * `parse` says why it cannot be used
+    pub(crate) fn read<T>(
+        &self,
+        name: &str,
+        what: &str,
+        warnings: &mut Vec<Warning>,
+        parse: impl FnOnce(&[u8]) -> Result<T, String>,
+    ) -> Option<T> {
+        let path = self.folder.as_ref()?.join(name);
+        let found = match fs::read(&path) {
+            Ok(bytes) => parse(&bytes),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+            Err(error) => Err(format!("cannot be read: {error}")),
+        };
+        let told = |why| format!("{}: {why}; what it held is made anew", path.display());
+        found.map_err(|why| warnings.push(Warning::new(what, told(why)))).ok()
+    }
+
+    /// Keeps a file. It is written beside its place and renamed, so that a reader finds all of it
+    /// or none, whoever writes at the same time; of two writers the last one stays.
+    pub(crate) fn write(&self, name: &str, what: &str, warnings: &mut Vec<Warning>, bytes: &[u8]) {
+        let Some(folder) = &self.folder else {
+            return;
+        };
+        let path = folder.join(name);
+        if let Err(error) = publish(folder, &path, bytes) {
+            let message = format!("{}: cannot be kept: {error}", path.display());
+            let warning = Warning::new(what, message);
             // Tried again and again in a long build, told once.
             if !warnings.contains(&warning) {
                 warnings.push(warning);
             }
         }
     }
-
-    fn path(&self, scanner: &Scanner, axis: AxisOptions) -> Option<PathBuf> {
-        let name = key(scanner, axis).file_name();
-        self.folder.as_ref().map(|folder| folder.join(name))
-    }
-}
-
-/// The levels in a file; `None` where there is no file, else why it cannot be used.
-fn read(path: &Path, key: AtlasKey) -> Result<Vec<AtlasLevel>, Option<String>> {
-    let bytes = fs::read(path).map_err(|error| {
-        (error.kind() != io::ErrorKind::NotFound).then(|| format!("cannot be read: {error}"))
-    })?;
-    atlas_file::read(&bytes, key).map_err(|error| Some(error.to_string()))
 }
 
 fn publish(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -108,7 +118,7 @@ fn publish(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Everything that decides an atlas: numbers as their shortest text that reads back the same.
-fn key(scanner: &Scanner, axis: AxisOptions) -> AtlasKey {
+fn key(scanner: &Scanner, axis: AxisOptions) -> CacheKey {
     let numbers = [
         scanner.rotor_inertia_kg_m2,
         scanner.mirror_inertia_kg_m2,
@@ -126,5 +136,5 @@ fn key(scanner: &Scanner, axis: AxisOptions) -> AtlasKey {
         Model::Held { .. } => Some((scanner.servo, scanner.kt_uncertainty)),
         Model::Rigid | Model::Flexible | Model::Robust { .. } | Model::Closest { .. } => None,
     };
-    AtlasKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}"))
+    CacheKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}"))
 }

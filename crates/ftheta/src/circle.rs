@@ -3,7 +3,6 @@
 use crate::Error;
 use crate::mark::{MarkOptions, Marked, PlanTimes, Played, Stage, plan_times, play_watched};
 use ftheta_model::machine::Machine;
-use ftheta_model::plan::Planner;
 use ftheta_model::recipe::{ClassicRecipe, Pen};
 use ftheta_model::space::FieldPoint;
 use ftheta_model::trace::Trace;
@@ -11,7 +10,7 @@ use ftheta_physics::plan::Plan;
 pub use ftheta_planner::circle::Ellipse;
 use ftheta_planner::circle::{self, CircleOptions};
 use ftheta_planner::classic::Settings;
-use ftheta_planner::optimal::obstacle;
+use ftheta_planner::optimal::is_servo_known;
 use kurbo::Point;
 
 /// Least way over which a speed is measured, mm: a trace's rounding is 1e-4 of it.
@@ -55,8 +54,9 @@ pub fn circle(
     options: &MarkOptions,
     observer: &mut dyn FnMut(Stage),
 ) -> Result<Circled, Error> {
-    if let Some(why) = obstacle(machine) {
-        return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
+    if !is_servo_known(machine) {
+        let why = "its servo is not known, or has a memory of its own";
+        return Err(Error::NoPlanner { planner: "circle", why });
     }
     observer(Stage::Plan);
     let (tolerance_mm, voltage_reserve) = (options.tolerance_mm, options.reserve);

@@ -3,6 +3,7 @@
 //! A drawing in, a marked field out: [`import::drawing`] reads a file as a job, [`mark::mark`]
 //! lays, plans, audits and plays it on the digital twin, [`results::add`] writes what came of it.
 
+pub mod against;
 pub mod atlas_store;
 pub mod circle;
 pub mod convert;

@@ -9,6 +9,7 @@ use ftheta_model::job::Job;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, Planner};
 use ftheta_model::recipe::Recipe;
+use ftheta_model::toolpath::Toolpath;
 use ftheta_model::trace::{AxisStates, Trace};
 use ftheta_model::warning::{Imported, Warning};
 use ftheta_physics::optics::scale_mm_per_rad;
@@ -20,6 +21,7 @@ use ftheta_report::score::{Score, Scorer};
 use ftheta_toolpath::lay::{LayOptions, Order, lay};
 use ftheta_twin::mismatch::Mismatch;
 use ftheta_twin::twin::{Twin, TwinOptions};
+use kurbo::Shape;
 
 /// How a job is marked.
 #[derive(Clone, Debug)]
@@ -123,6 +125,8 @@ pub enum Stage {
     Play(f64),
     /// Dose map and figures are finished.
     Finish,
+    /// The classic planner's delays are tuned, for comparison; the share of the columns done.
+    Tune(f64),
 }
 
 /// States of the axes that are kept, about.
@@ -130,6 +134,9 @@ const N_STATES: u64 = 100_000;
 
 /// Most pixels of the dose map's bounding box.
 const N_PIXELS_MAX: f64 = 24e6;
+
+/// Accuracy of the length of a curve, mm.
+const LENGTH_ACCURACY_MM: f64 = 1e-6;
 
 /// Blocks between two looks at the trace.
 const N_BLOCKS_PER_STRETCH: usize = 32;
@@ -148,17 +155,7 @@ pub fn mark(
     observer: &mut dyn FnMut(Stage),
 ) -> Result<Marked, Error> {
     observer(Stage::Lay);
-    let lay_options = LayOptions {
-        flatten_tolerance_mm: recipe.flatten_tolerance_mm.unwrap_or(0.002),
-        order: options.order,
-        half_field_mm: 0.5 * machine.optics.field_mm,
-        clip: options.clip,
-        ..LayOptions::default()
-    };
-    let Imported { value: mut toolpath, mut warnings } = lay(job, &lay_options)?;
-    if let Some(speed_mm_s) = options.speed_mm_s {
-        toolpath.pens.iter_mut().for_each(|pen| pen.mark_speed_mm_s = speed_mm_s);
-    }
+    let Imported { value: toolpath, mut warnings } = lay_out(job, machine, recipe, options)?;
     observer(Stage::Plan);
     let settings = Settings::new(machine, &recipe.classic)?;
     let planning = Planning { machine, settings: &settings, options };
@@ -168,6 +165,27 @@ pub fn mark(
     let times = plan_times(&plan);
     let seed = options.seed;
     Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
+}
+
+/// The toolpath of a job at the speeds asked for.
+pub(crate) fn lay_out(
+    job: &Job,
+    machine: &Machine,
+    recipe: &Recipe,
+    options: &MarkOptions,
+) -> Result<Imported<Toolpath>, Error> {
+    let lay_options = LayOptions {
+        flatten_tolerance_mm: recipe.flatten_tolerance_mm.unwrap_or(0.002),
+        order: options.order,
+        half_field_mm: 0.5 * machine.optics.field_mm,
+        clip: options.clip,
+        ..LayOptions::default()
+    };
+    let mut laid = lay(job, &lay_options)?;
+    if let Some(speed_mm_s) = options.speed_mm_s {
+        laid.value.pens.iter_mut().for_each(|pen| pen.mark_speed_mm_s = speed_mm_s);
+    }
+    Ok(laid)
 }
 
 /// Stray energy from which on it is worth a warning.
@@ -228,36 +246,57 @@ pub(crate) fn play_watched(
         pixel_mm: pixel_mm(plan),
         state_stride: n_samples.div_ceil(N_STATES),
     };
-    let mut machine = plan.machine.clone();
-    // A displacement in the field is half that of the beam's angle times the focal length.
-    machine.scanner.sensor.noise_rad = machine
-        .scanner
-        .sensor
-        .noise_rad
-        .hypot(options.noise_mm / scale_mm_per_rad(&machine.optics));
-    let mut twin = Twin::new(&machine, &twin_options)?;
-    let mut renderer = Renderer::new(plan);
-    let mut scorer = Scorer::new(plan);
+    let mut twin = twin(&plan.machine, options, &twin_options)?;
     let mut states = Vec::new();
+    let score = score(plan, Renderer::new(plan), &mut twin, &mut |first_index, trace| {
+        observer(Stage::Play(first_index as f64 / n_samples as f64));
+        watch(&trace);
+        states.extend(trace.states);
+    })?;
+    observer(Stage::Finish);
+    Ok(Played { score, dose: twin.into_dose(), states })
+}
+
+/// A twin of this machine, with the noise asked for.
+pub(crate) fn twin(
+    machine: &Machine,
+    options: &MarkOptions,
+    twin_options: &TwinOptions,
+) -> Result<Twin, Error> {
+    let mut machine = machine.clone();
+    let sensor = &mut machine.scanner.sensor;
+    // A displacement in the field is half that of the beam's angle times the focal length.
+    let noise_rad = options.noise_mm / scale_mm_per_rad(&machine.optics);
+    sensor.noise_rad = sensor.noise_rad.hypot(noise_rad);
+    Ok(Twin::new(&machine, twin_options)?)
+}
+
+/// Plays a plan from a renderer at its start on a twin at rest.
+///
+/// * `see` is given stretch after stretch, and the index of the sample after it
+pub(crate) fn score(
+    plan: &Plan,
+    mut renderer: Renderer<'_>,
+    twin: &mut Twin,
+    see: &mut dyn FnMut(u64, Trace),
+) -> Result<Score, Error> {
+    let mut scorer = Scorer::new(plan);
     let mut block = Block::default();
     let mut n_blocks = 0;
+    let mut look = |twin: &mut Twin, index: u64| {
+        let trace = twin.take_trace();
+        scorer.add(&trace);
+        see(index, trace);
+    };
     while renderer.next_block(&mut block) {
         if n_blocks % N_BLOCKS_PER_STRETCH == 0 {
-            observer(Stage::Play(block.first_index as f64 / n_samples as f64));
-            let mut trace = twin.take_trace();
-            scorer.add(&trace);
-            watch(&trace);
-            states.append(&mut trace.states);
+            look(twin, block.first_index);
         }
         n_blocks += 1;
         twin.push(&block)?;
     }
-    let mut trace = twin.take_trace();
-    scorer.add(&trace);
-    watch(&trace);
-    states.append(&mut trace.states);
-    observer(Stage::Finish);
-    Ok(Played { score: scorer.finish(), dose: twin.into_dose(), states })
+    look(twin, plan.n_samples());
+    Ok(scorer.finish())
 }
 
 /// A third of the spot, or coarser where the drawing is so large that memory would not do.
@@ -289,21 +328,21 @@ pub fn plan_times(plan: &PlanDraft) -> PlanTimes {
         ..PlanTimes::default()
     };
     times.jump_s = times.duration_s - times.mark_s;
+    times.marked_mm = plan.marks.iter().map(|mark| mark.curve.perimeter(LENGTH_ACCURACY_MM)).sum();
     let last_mark = plan.marks.len() as u32 - 1;
     let mut mark_before = None;
+    // Skywriting's runs belong to the jump between them.
+    let mut jumped = false;
     for segment in &plan.segments {
         let between = mark_before.is_some_and(|mark| mark < last_mark);
         match (segment.mark_index, segment.motion) {
-            (Some(index), motion) => {
+            (Some(index), _) => {
                 mark_before = Some(index);
-                match motion {
-                    Motion::Travel { profile, .. } => times.marked_mm += profile.length_mm,
-                    Motion::Track { .. } => times.marked_mm += plan.track_length_mm(&motion),
-                    Motion::Hold { .. } | Motion::Drive { .. } => {}
-                }
+                jumped = false;
             }
             (None, Motion::Travel { .. } | Motion::Track { .. } | Motion::Drive { .. }) => {
-                times.n_jumps += usize::from(between);
+                times.n_jumps += usize::from(between && !jumped);
+                jumped = true;
             }
             (None, Motion::Hold { .. }) if between => {
                 times.delay_s += f64::from(segment.n_ticks) * plan.machine.output.period_s();

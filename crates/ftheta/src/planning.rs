@@ -12,7 +12,7 @@ use ftheta_physics::servo::Gains;
 use ftheta_planner::classic::{self, Settings};
 use ftheta_planner::corner::Corners;
 use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
-use ftheta_planner::optimal::{self, OptimalOptions, Restraint};
+use ftheta_planner::optimal::{self, Motions, OptimalOptions, Restraint};
 
 /// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
 /// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
@@ -40,15 +40,31 @@ impl Planning<'_> {
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
-        let Self { machine, options, .. } = *self;
-        let obstacle = optimal::obstacle(machine);
-        if let (Some(Planner::Optimal), Some(why)) = (options.planner, obstacle) {
-            return Err(Error::NoPlanner { planner: Planner::Optimal.name(), why });
+        match self.options.planner {
+            Some(Planner::Classic) => self.plan_classic(toolpath, observer),
+            Some(Planner::Optimal) | None if optimal::is_servo_known(self.machine) => {
+                self.plan_optimal(&toolpath, warnings, observer)
+            }
+            Some(Planner::Optimal) | None => self.plan_by_lag(toolpath, observer),
         }
-        if options.planner != Some(Planner::Classic) && obstacle.is_none() {
-            return self.plan_optimal(&toolpath, warnings, observer);
-        }
-        self.plan_classic(toolpath, observer)
+    }
+
+    /// Plans for a head of which only the lag is known.
+    fn plan_by_lag(
+        &self,
+        toolpath: Toolpath,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<Plan, Error> {
+        observer(Stage::Plan);
+        let optimal = self.optimal(optimal::RESTRAINTS[0], self.options.reserve);
+        let draft = optimal::draft(toolpath, self.machine, Motions::Lag, &optimal)?;
+        observer(Stage::Audit);
+        Ok(Plan::new(draft)?)
+    }
+
+    fn optimal(&self, restraint: Restraint, voltage_reserve: f64) -> OptimalOptions {
+        let MarkOptions { tolerance_mm, corner, .. } = *self.options;
+        OptimalOptions { tolerance_mm, corner, voltage_reserve, restraint }
     }
 
     /// Plans with ever more restraint, until the audit finds that driver and coils stand it.
@@ -59,18 +75,17 @@ impl Planning<'_> {
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
         let Self { machine, options, .. } = *self;
-        let (tolerance_mm, corner) = (options.tolerance_mm, options.corner);
         let mut refused = None;
         for restraint in optimal::RESTRAINTS {
             let atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
             observer(Stage::Plan);
             let voltage_reserve = atlas.axis_options().voltage_reserve;
             let transitions = Transitions::with_atlas(atlas)?;
-            let optimal = OptimalOptions { tolerance_mm, corner, voltage_reserve, restraint };
+            let optimal = self.optimal(restraint, voltage_reserve);
             let gains = Gains::design(&machine.scanner, machine.output.period_s())?;
             let scanner = transitions.atlas().scanner().clone();
             let corners = Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
-            let motions = (&transitions, Some(&corners));
+            let motions = Motions::Known { transitions: &transitions, corners: &corners };
             let draft = optimal::draft(toolpath.clone(), machine, motions, &optimal)?;
             observer(Stage::Audit);
             match Plan::new(draft) {

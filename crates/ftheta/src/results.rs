@@ -1,23 +1,31 @@
 //! The files of a marked job: report, picture, plan.
 
 use crate::Error;
+use crate::against::{Against, WAYS};
 use crate::mark::Marked;
 use crate::output::Output;
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::warning::Warning;
+use ftheta_planner::classic::Settings;
+use ftheta_report::comparison::Rival;
 use ftheta_report::plate::{PlateOptions, plate_png};
 use ftheta_report::report::{ReportInput, TimeSplit, report_html};
 
 /// What the report says of a job beside its figures.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct About<'a> {
     /// Name of the job.
     pub job_name: &'a str,
     /// Size of the page, mm.
     pub page_mm: [f64; 2],
+    /// What the job was compared with.
+    pub against: Option<&'a Against>,
     /// What was ignored or changed.
     pub warnings: &'a [Warning],
 }
+
+/// Of a setting that plays no part.
+pub const NONE: &str = "–";
 
 /// Pixels along the longest side of the picture, which the report shows as well.
 const PICTURE_PX: u32 = 1800;
@@ -45,6 +53,7 @@ pub fn add(
 
 fn report(marked: &Marked, about: &About<'_>, plate_png: &[u8]) -> String {
     let times = &marked.times;
+    let against = about.against.map(rivals).unwrap_or_default();
     report_html(&ReportInput {
         job_name: about.job_name,
         plan: &marked.plan,
@@ -59,46 +68,74 @@ fn report(marked: &Marked, about: &About<'_>, plate_png: &[u8]) -> String {
             delay_s: times.delay_s,
         },
         settings: &settings_rows(marked),
+        against: &against,
         warnings: about.warnings,
         plate_png,
     })
 }
 
+fn rivals(against: &Against) -> Vec<Rival<'_>> {
+    let columns = WAYS.iter().zip(&against.columns);
+    let rivals = columns.map(|(way, column)| Rival {
+        name: way.name,
+        score: column.as_ref().map(|column| &column.score),
+        settings: column.as_ref().map(|column| delay_rows(&column.settings)).unwrap_or_default(),
+    });
+    rivals.collect()
+}
+
 fn settings_rows(marked: &Marked) -> Vec<(String, String)> {
-    let settings = &marked.settings;
     let machine = &marked.plan.machine;
     let laser = &machine.laser;
-    let us = |time_s: f64| format!("{:.0} µs", time_s * 1e6);
-    let ns = |time_ns: i64| format!("{:.2} µs", time_ns as f64 * 1e-3);
-    let interpolation = match settings.interpolation {
-        Interpolation::Absolute => "absolute",
-        Interpolation::Dda => "DDA",
-    };
     let mut rows = vec![
         ("Wavelength", format!("{} nm", laser.wavelength_nm)),
         ("Spot diameter", format!("{:.0} µm", laser.spot_diameter_mm * 1e3)),
-        ("Light after on edge", ns(laser.on_latency_ns)),
-        ("Light after off edge", ns(laser.off_latency_ns)),
+        ("Light after on edge", time(laser.on_latency_ns as f64 * 1e-9)),
+        ("Light after off edge", time(laser.off_latency_ns as f64 * 1e-9)),
         ("Output period", format!("{} µs", f64::from(machine.output.period_ns) * 1e-3)),
         ("Output word", format!("{} bit", machine.output.word_bits)),
-        ("Jump speed", format!("{} mm/s", settings.jump_speed_mm_s)),
-        (
-            "Jump delay",
-            format!(
-                "{:.0} to {:.0} µs over {} mm",
-                settings.jump_delay_min_s * 1e6,
-                settings.jump_delay_s * 1e6,
-                settings.jump_length_limit_mm
-            ),
-        ),
-        ("Mark delay", us(settings.mark_delay_s)),
-        ("Polygon delay at 90°", us(settings.polygon_delay_s)),
-        ("Laser-on delay", ns(settings.laser_on_delay_ns)),
-        ("Laser-off delay", ns(settings.laser_off_delay_ns)),
-        ("Interpolation", interpolation.into()),
     ];
     if let Some(pulse_khz) = laser.pulse_khz {
         rows.insert(1, ("Pulse rate", format!("{pulse_khz} kHz")));
     }
-    rows.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    let rows = rows.into_iter().map(|(key, value)| (key.to_owned(), value));
+    let delays = delay_rows(&marked.settings).into_iter().filter(|(_, value)| value != NONE);
+    rows.chain(delays).collect()
+}
+
+/// The settings of a classic controller, for people; what plays no part is a dash.
+pub fn delay_rows(settings: &Settings) -> Vec<(String, String)> {
+    let interpolation = match settings.interpolation {
+        Interpolation::Absolute => "absolute",
+        Interpolation::Dda => "DDA",
+    };
+    let (short_s, long_s) = (settings.jump_delay_min_s, settings.jump_delay_s);
+    let jump_delay = match short_s == long_s {
+        true => time(long_s),
+        false => {
+            let limit_mm = settings.jump_length_limit_mm;
+            format!("{} to {} over {limit_mm} mm", time(short_s), time(long_s))
+        }
+    };
+    let sky = settings.skywriting();
+    let only = |plays: bool, time_s: f64| if plays { time(time_s) } else { NONE.into() };
+    [
+        ("Jump speed", format!("{} mm/s", settings.jump_speed_mm_s)),
+        ("Jump delay", jump_delay),
+        ("Mark delay", only(!sky, settings.mark_delay_s)),
+        ("Polygon delay at 90°", time(settings.polygon_delay_s)),
+        ("Laser-on delay", time(settings.laser_on_delay_ns as f64 * 1e-9)),
+        ("Laser-off delay", time(settings.laser_off_delay_ns as f64 * 1e-9)),
+        ("Run-in", only(sky, settings.sky_run_in_s)),
+        ("Run-out", only(sky, settings.sky_run_out_s)),
+        ("Interpolation", interpolation.into()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .into()
+}
+
+/// A time in µs, hundredths where there are any.
+fn time(time_s: f64) -> String {
+    let text = format!("{:.2}", time_s * 1e6);
+    format!("{} µs", text.trim_end_matches('0').trim_end_matches('.'))
 }

@@ -86,5 +86,5 @@ fn impossible_circles_are_refused() {
     let mut black_box = s10;
     black_box.output.drive = Drive::BlackBox;
     let message = refuse(&black_box, &at_centre([0.5, 0.5], 1000.0));
-    assert!(message.contains("black box"), "{message}");
+    assert!(message.contains("servo is not known"), "{message}");
 }

@@ -142,6 +142,35 @@ fn ramps_and_dda_are_played() {
     assert!(stepped.score.contour_error_um.max < 20.0, "{:?}", stepped.score.contour_error_um);
 }
 
+/// Skywriting: legs at full speed from end to end have the dose asked for right up to their ends,
+/// where delays burn corners; they pay with time.
+#[test]
+fn skywriting_keeps_speed_and_dose_up_to_every_corner() {
+    let machine = preset("S10-f160");
+    let sky = ClassicRecipe {
+        sky_run_in_s: Some(500e-6),
+        sky_run_out_s: Some(200e-6),
+        jump_delay_min_s: Some(0.0),
+        jump_delay_s: Some(0.0),
+        ..ClassicRecipe::default()
+    };
+    for interpolation in [Interpolation::Absolute, Interpolation::Dda] {
+        let recipe = ClassicRecipe { interpolation: Some(interpolation), ..sky };
+        let marked = run(&machine, &at_speed(2000.0, recipe), &classic()).unwrap();
+        // Four sides, two lines, one circle.
+        assert_eq!((marked.plan.marks.len(), marked.times.n_jumps), (7, 6));
+        assert_eq!(marked.times.delay_s, 0.0);
+        let score = &marked.score;
+        assert!(score.end_error_um.max < 3.0, "ends {:?}", score.end_error_um);
+        let dose = score.dose_ratio.unwrap();
+        assert!(0.98 < dose.min && dose.max < 1.02, "dose {dose:?}");
+        let delays = run(&machine, &at_speed(2000.0, ClassicRecipe::default()), &classic());
+        let delays = delays.unwrap();
+        assert!(delays.score.dose_ratio.unwrap().max > 3.0);
+        assert!((delays.times.marked_mm - marked.times.marked_mm).abs() < 1e-6);
+    }
+}
+
 #[test]
 fn other_servos_and_optics_are_played() {
     let mut machine = preset("S10");

@@ -189,7 +189,7 @@ fn an_atlas_is_kept_and_a_damaged_one_is_built_anew() {
         fs::write(&path, damage).unwrap();
         let anew = run(LINES, &machine, &stored(folder.path())).unwrap();
         assert_eq!(first.plan.id(), anew.plan.id());
-        assert!(anew.warnings.iter().any(|w| w.to_string().contains("built anew")));
+        assert!(anew.warnings.iter().any(|w| w.to_string().contains("made anew")));
         assert_eq!(fs::read(&path).unwrap(), whole);
     }
 }

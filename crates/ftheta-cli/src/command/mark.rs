@@ -1,9 +1,10 @@
 //! `ftheta mark`: the main job.
 
-use crate::arguments::Mark;
+use crate::arguments::{AgainstName, Mark};
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::{note, say};
+use ftheta::against::{Against, Column, WAYS, against};
 use ftheta::atlas_store::AtlasStore;
 use ftheta::formats::svg::SvgOptions;
 use ftheta::mark::{MarkOptions, Marked, mark};
@@ -11,7 +12,7 @@ use ftheta::model::warning::Warning;
 use ftheta::output::Output;
 use ftheta::physics::audit::Limits;
 use ftheta::planner::optimal::Corner;
-use ftheta::results::{self, About};
+use ftheta::results::{self, About, delay_rows};
 use ftheta::{Error, import, machines};
 use std::path::PathBuf;
 
@@ -46,19 +47,69 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let marked = mark(&drawing.value, &machine, &recipe, &options, &mut |stage| {
         progress.observe(stage);
     })?;
+    let mut compare = |AgainstName::Classic| {
+        against(&drawing.value, &machine, &recipe, &options, &mut |stage| progress.observe(stage))
+    };
+    let against = arguments.against.map(&mut compare).transpose()?;
     progress.enter("write");
-    let warnings: Vec<Warning> = drawing.warnings.iter().chain(&marked.warnings).cloned().collect();
-    let about =
-        About { job_name: &title(arguments), page_mm: drawing.value.page_mm, warnings: &warnings };
+    let told = against.iter().flat_map(|against| &against.warnings);
+    let warnings: Vec<Warning> =
+        drawing.warnings.iter().chain(&marked.warnings).chain(told).cloned().collect();
+    let about = About {
+        job_name: &title(arguments),
+        page_mm: drawing.value.page_mm,
+        against: against.as_ref(),
+        warnings: &warnings,
+    };
     let files = results::add(&mut output, &marked, &about)?;
     output.publish()?;
     let stages = progress.finish();
+    let duration_s = marked.score.duration_s;
+    if let Some(against) = &against {
+        note_delays(against);
+    }
     if as_json {
-        json::print(&json::marked(&marked, &warnings, &stages, &files));
+        let mut object = json::marked(&marked, &warnings, &stages, &files);
+        if let Some(against) = &against {
+            object["against"] = json::against(against, duration_s);
+        }
+        json::print(&object);
     } else {
         print(&marked, &warnings, &stages, &files);
+        against.iter().for_each(|against| print_against(against, duration_s));
     }
     Ok(())
+}
+
+/// The delays that were found, a line for each way.
+fn note_delays(against: &Against) {
+    for (way, column) in WAYS.iter().zip(&against.columns) {
+        let rows = column.as_ref().map(|column| delay_rows(&column.settings)).unwrap_or_default();
+        let rows = rows.iter().filter(|(_, value)| value != results::NONE);
+        let rows: Vec<_> = rows.map(|(key, value)| format!("{key} {value}")).collect();
+        if !rows.is_empty() {
+            note!("{}: {}", way.name, rows.join(", "));
+        }
+    }
+}
+
+fn print_against(against: &Against, duration_s: f64) {
+    for (way, column) in WAYS.iter().zip(&against.columns) {
+        let Some(Column { score, .. }) = column else {
+            say!("against  {:12} no delays keep the tolerance", way.name);
+            continue;
+        };
+        say!(
+            "against  {:12} {:.2} ms, {:.3} of this; contour error {:.1} µm max, ends {:.1} µm max, \
+             coverage {:.1} µm max",
+            way.name,
+            score.duration_s * 1e3,
+            score.duration_s / duration_s,
+            score.contour_error_um.max,
+            score.end_error_um.max,
+            score.coverage_error_um.max
+        );
+    }
 }
 
 fn title(arguments: &Mark) -> String {

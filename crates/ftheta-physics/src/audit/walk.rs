@@ -38,7 +38,9 @@ pub struct Walk<'a> {
     /// Both axes at the tick of the sample that comes next, and the voltages acting from it on;
     /// `None` while they follow words that were not computed from voltages.
     axes: Option<[(State, f64); 2]>,
-    /// How far the axes are from where the segment begins, rad.
+    /// Both axes a tick later, where a track has just ended: what follows goes on from there.
+    later: Option<[State; 2]>,
+    /// How far the axes are from where a segment begins, rad.
     gap_rad: f64,
 }
 
@@ -64,13 +66,14 @@ impl<'a> Walk<'a> {
             leg_start_mm: 0.0,
             track: None,
             axes: None,
+            later: None,
             gap_rad: 0.0,
         };
         walk.enter();
         walk
     }
 
-    /// How far the segment of the sample given last begins from where the one before ended, rad.
+    /// How far the mirrors are from where a segment begins, rad: after its first sample was given.
     pub fn gap_rad(&self) -> f64 {
         self.gap_rad
     }
@@ -98,6 +101,7 @@ impl<'a> Walk<'a> {
                 Command::Place(self.place(&segment.motion, last).into())
             }
         };
+        self.gap_rad = if self.n_given == 1 { self.gap(&segment.motion) } else { 0.0 };
         if self.n_given == segment.n_ticks {
             self.leave(&segment.motion);
             self.segment_index += 1;
@@ -114,11 +118,10 @@ impl<'a> Walk<'a> {
                 self.leg = first;
             }
             self.track = TrackWalk::new(self.draft, &segment.motion);
-            self.gap_rad = self.gap(&segment.motion);
         }
     }
 
-    /// Distance between the mirrors after the motion before and where `motion` begins, rad.
+    /// Distance between the mirrors, when the voltages before have acted, and where `motion` begins.
     fn gap(&self, motion: &Motion) -> f64 {
         let wanted = match (motion, &self.track) {
             (&Motion::Hold { vertex }, _) => {
@@ -148,8 +151,12 @@ impl<'a> Walk<'a> {
             }
             Motion::Travel { .. } => self.axes = None,
             Motion::Track { .. } => {
-                if let (Some(Ok(track)), Some(inverse)) = (&self.track, self.inverse) {
+                if let (Some(Ok(track)), Some(inverse)) = (&mut self.track, self.inverse) {
                     self.axes = Some([0, 1].map(|axis| inverse.state(&track.around(axis))));
+                    self.later = match track.advance() {
+                        Ok(()) => Some([0, 1].map(|axis| inverse.state(&track.around(axis)).0)),
+                        Err(_) => None,
+                    };
                 }
             }
             Motion::Drive { .. } => {}
@@ -162,6 +169,7 @@ impl<'a> Walk<'a> {
             return Command::Angles(MirrorAngles { x_rad: next[0], y_rad: next[1] });
         }
         let mut axes = self.axes.unwrap_or([(State::zeros(), 0.0); 2]);
+        let later = self.later.take();
         let mut angles = [0.0; 2];
         for (axis, (state, acting_v)) in axes.iter_mut().enumerate() {
             let answer_v = |reference_rad: f64| {
@@ -176,7 +184,10 @@ impl<'a> Walk<'a> {
             // The servo answers linearly.
             let (without_v, with_v) = (answer_v(0.0), answer_v(1.0));
             angles[axis] = (next[axis] - without_v) / (with_v - without_v);
-            *state = self.step.a * *state + self.step.b * *acting_v;
+            *state = match later {
+                Some(later) => later[axis],
+                None => self.step.a * *state + self.step.b * *acting_v,
+            };
             *acting_v = next[axis];
         }
         self.axes = Some(axes);

@@ -6,7 +6,7 @@ use ftheta_model::machine::Machine;
 use ftheta_model::space::FieldPoint;
 use ftheta_physics::galvo::{Galvo, State, Step};
 use ftheta_physics::optics::angles_from_field;
-use kurbo::Point;
+use kurbo::{Arc, BezPath, Point, Shape};
 use nalgebra::{Complex, SMatrix, SVector};
 use std::f64::consts::TAU;
 
@@ -18,6 +18,10 @@ const RATE_SHARE: f64 = 0.25;
 const SMALLEST_RAD: f64 = 1e-14;
 /// Fewest ticks of a turn.
 const N_TICKS_MIN: f64 = 10.0;
+/// Steps of Newton's method, which doubles its digits.
+const N_NEWTON: usize = 6;
+/// Distance of the stored curve from the true one, mm: what a trace resolves.
+const CURVE_MM: f64 = 1e-6;
 /// Nodes and weights of Gauss's rule with five places, on -1 to 1.
 const GAUSS: [(f64, f64); 5] = [
     (0.0, 128.0 / 225.0),
@@ -84,21 +88,28 @@ impl Ellipse {
         half * GAUSS.into_iter().map(at).sum::<f64>()
     }
 
-    /// Places at equal distances along it, from the one farthest in x on.
-    fn even_places(&self) -> Vec<FieldPoint> {
+    /// Angles of the parameter at equal distances along it, from the place farthest in x on.
+    fn even_angles(&self) -> Vec<f64> {
         let step_mm = self.length_mm() / N_PLACES as f64;
         let mut angle_rad = 0.0;
-        let mut places = Vec::with_capacity(N_PLACES);
+        let mut angles_rad = Vec::with_capacity(N_PLACES);
         for _ in 0..N_PLACES {
-            places.push(self.place(angle_rad));
+            angles_rad.push(angle_rad);
             let mut stretch_rad = step_mm / self.slope_mm(angle_rad);
-            for _ in 0..8 {
+            for _ in 0..N_NEWTON {
                 let missing_mm = step_mm - self.arc_mm(angle_rad, stretch_rad);
                 stretch_rad += missing_mm / self.slope_mm(angle_rad + stretch_rad);
             }
             angle_rad += stretch_rad;
         }
-        places
+        angles_rad
+    }
+
+    /// Its curve from this many turns, in `N_PLACES`, after the place farthest in x.
+    pub(super) fn curve(&self, turns: f64) -> BezPath {
+        let start_angle = self.even_angles()[(turns * N_PLACES as f64) as usize % N_PLACES];
+        let (center, radii) = (self.centre, self.radii_mm);
+        Arc { center, radii, start_angle, sweep_angle: TAU, x_rotation: 0.0 }.to_path(CURVE_MM)
     }
 }
 
@@ -116,7 +127,8 @@ impl Harmonics {
             });
         }
         let mut angles = [Vec::with_capacity(N_PLACES), Vec::with_capacity(N_PLACES)];
-        for place in ellipse.even_places() {
+        for angle_rad in ellipse.even_angles() {
+            let place = ellipse.place(angle_rad);
             let (x_mm, y_mm) = (place.x_mm, place.y_mm);
             let there = angles_from_field(&machine.optics, place)
                 .ok_or(PlanError::Unreachable { x_mm, y_mm })?;

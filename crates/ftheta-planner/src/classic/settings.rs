@@ -33,6 +33,10 @@ pub struct Settings {
     pub acceleration_mm_s2: f64,
     /// Deceleration at the end of every vector of a mark, mm/s²; infinite for none.
     pub deceleration_mm_s2: f64,
+    /// Run at mark speed before every leg, s; see [`Settings::skywriting`].
+    pub sky_run_in_s: f64,
+    /// Run at mark speed after every leg, s.
+    pub sky_run_out_s: f64,
 }
 
 /// Jump speed that suits most jobs, mm/s: faster jumps overshoot more than they save.
@@ -79,7 +83,16 @@ impl Settings {
             interpolation: recipe.interpolation.unwrap_or_default(),
             acceleration_mm_s2: recipe.acceleration_mm_s2.unwrap_or(f64::INFINITY),
             deceleration_mm_s2: recipe.deceleration_mm_s2.unwrap_or(f64::INFINITY),
+            sky_run_in_s: recipe.sky_run_in_s.unwrap_or(0.0),
+            sky_run_out_s: recipe.sky_run_out_s.unwrap_or(0.0),
         })
+    }
+
+    /// Whether every leg between corners is a mark of its own, at full speed from end to end: the
+    /// beam runs in and out beside it, and jumps from one to the next. Then no mark or polygon
+    /// delay is waited for, micro-steps are absolute, and there are no ramps.
+    pub fn skywriting(&self) -> bool {
+        self.sky_run_in_s > 0.0 || self.sky_run_out_s > 0.0
     }
 
     /// Wait after a jump: grows linearly with its length up to the limit, s.
@@ -130,6 +143,8 @@ impl Settings {
                 DELAY_MAX_S,
                 "s",
             ),
+            ("sky_run_in", self.sky_run_in_s, 0.0, DELAY_MAX_S, "s"),
+            ("sky_run_out", self.sky_run_out_s, 0.0, DELAY_MAX_S, "s"),
             ("acceleration", self.acceleration_mm_s2, 1.0, f64::INFINITY, "mm/s²"),
             ("deceleration", self.deceleration_mm_s2, 1.0, f64::INFINITY, "mm/s²"),
         ];

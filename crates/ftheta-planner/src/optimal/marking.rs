@@ -10,6 +10,7 @@ use crate::corner::Corners;
 use ftheta_model::plan::{Knot, PlannedMark};
 use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Mark;
+use ftheta_physics::follow::TAPS_AFTER;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::scale_mm_per_rad;
 
@@ -35,6 +36,8 @@ pub(super) struct Marking<'a> {
     pub(super) options: &'a OptimalOptions,
     pub(super) corners: Option<&'a Corners>,
     pub(super) galvo: Galvo,
+    /// How long the beam runs at mark speed before and after light, s.
+    pub(super) run_s: [f64; 2],
 }
 
 /// A stretch between two turns, and the turn after it.
@@ -98,6 +101,7 @@ impl Marking<'_> {
         }
         let start_s = self.weave.now_s();
         let mut end_s = start_s;
+        let light_s = start_s + self.run_s[0];
         let mut progress_mm = Vec::new();
         let corner_mm = |turn: &Turn| path.stations[turn.vertex].distance_mm;
         for (piece_index, piece) in pieces.iter().enumerate() {
@@ -129,10 +133,14 @@ impl Marking<'_> {
             source: mark.source,
             on_ns: 0,
             off_ns: 0,
-            power_w: powers.first().map_or(pen.power_w, |&(_, power_w)| power_w),
+            power_w: powers
+                .iter()
+                .take_while(|(time_s, _)| *time_s <= light_s)
+                .last()
+                .map_or(pen.power_w, |&(_, power_w)| power_w),
             steps: Vec::new(),
         };
-        self.weave.light(planned, [start_s, end_s], &powers)
+        self.weave.light(planned, [light_s, end_s], &powers)
     }
 
     /// Corners of a path that can be taken by programs.
@@ -146,7 +154,9 @@ impl Marking<'_> {
             coverage_mm: COVERAGE_SHARE * tolerance_mm,
         };
         let speed = limits.speed_mm_s;
-        let margin_mm = speed * self.weave.smoothing.half_s;
+        // What the states at both ends of a turn are computed from has to be straight.
+        let margin_s = self.weave.smoothing.half_s + TAPS_AFTER as f64 * self.weave.period_s();
+        let margin_mm = speed * margin_s;
         let mut turns: Vec<Turn> = Vec::new();
         for vertex in self.sharp(path, limits) {
             let machine = self.weave.machine;
@@ -164,8 +174,8 @@ impl Marking<'_> {
                 None => path.stations[vertex].distance_mm,
             };
             let left_mm = path.length_mm() - path.stations[vertex].distance_mm;
-            let fits = straight_mm(path, vertex, false, before_mm) >= runs_mm[0]
-                && straight_mm(path, vertex, true, after_mm) >= runs_mm[1]
+            let fits = straight_mm(path, vertex, false, before_mm) >= before_mm
+                && straight_mm(path, vertex, true, after_mm) >= after_mm
                 && room_mm >= runs_mm[0]
                 && left_mm >= runs_mm[1];
             if fits {
@@ -199,16 +209,19 @@ impl Marking<'_> {
             let path = path.part(from, to);
             let knots = profile(&path, limits, self.weave.smoothing);
             let whole_s = time_at_s(&knots, path.length_mm());
-            let starts_s = before.map_or(0.0, |turn| turn.runs_s()[1]);
+            let starts_s = before.map_or(-self.run_s[0], |turn| turn.runs_s()[1]);
             let ends_s = after.map_or(0.0, |turn| turn.runs_s()[0]);
             let period_s = self.weave.period_s();
             let left_s = whole_s - starts_s - ends_s;
             let (n_ticks, factor) = match after {
-                None => (None, 1.0),
+                None => {
+                    let n_ticks = ((left_s + self.run_s[1]) / period_s - 1e-6).ceil().max(1.0);
+                    (n_ticks, 1.0)
+                }
                 Some(_) => {
                     let n_ticks = (left_s / period_s - 1e-6).ceil().max(1.0);
                     let all_s = n_ticks * period_s + starts_s + ends_s;
-                    (Some(n_ticks as u32), all_s / whole_s)
+                    (n_ticks, all_s / whole_s)
                 }
             };
             let knots = knots
@@ -219,8 +232,12 @@ impl Marking<'_> {
                     ..knot
                 })
                 .collect();
-            let stretch = Stretch { path, knots, n_ticks };
-            let laid = self.weave.lay(&stretch, place)?;
+            let limit = u32::MAX;
+            if n_ticks > f64::from(limit) {
+                return Err(PlanError::TooLong { place: place.into(), value: n_ticks, limit });
+            }
+            let stretch = Stretch { path, knots, n_ticks: n_ticks as u32 };
+            let laid = self.weave.lay(&stretch)?;
             pieces.push(Piece { stretch, laid, part: factor.recip() });
         }
         Ok(Some(pieces))
@@ -233,7 +250,7 @@ impl Marking<'_> {
         for (turn, pair) in turns.iter().zip(pieces.windows(2)) {
             let voltages = turn.voltages_v([pair[0].part, pair[1].part]);
             let (from, to) = (pair[0].laid.ends(), pair[1].laid.starts());
-            let voltages = self.weave.fly_by.corrected(voltages, from, to)?;
+            let voltages = self.weave.corrected(voltages, from, to)?;
             if !self.weave.allows(&voltages, from) {
                 return None;
             }

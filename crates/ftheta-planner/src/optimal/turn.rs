@@ -211,7 +211,7 @@ pub(super) fn candidates(
     (1..stations.len() - 1).filter(|&vertex| sharp(vertex)).collect()
 }
 
-/// How far a path is straight before or after a vertex, mm, up to `enough_mm`.
+/// How far a path is straight before or after a vertex, mm, up to `enough_mm`; past its ends it is.
 pub(super) fn straight_mm(path: &Path, vertex: usize, forwards: bool, enough_mm: f64) -> f64 {
     let stations = &path.stations;
     let at_mm = stations[vertex].distance_mm;
@@ -221,7 +221,7 @@ pub(super) fn straight_mm(path: &Path, vertex: usize, forwards: bool, enough_mm:
         let way_mm = (stations[here].distance_mm - at_mm).abs();
         let last = if forwards { here + 1 == stations.len() } else { here == 0 };
         if last || way_mm >= enough_mm {
-            return way_mm;
+            return way_mm.max(enough_mm);
         }
         let next = if forwards { here + 1 } else { here - 1 };
         let leg = if forwards { here } else { next };

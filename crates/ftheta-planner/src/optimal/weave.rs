@@ -1,10 +1,10 @@
 //! Weaves marks and the motion between them into one flowing plan.
 
 use super::fly_by::{FlyBy, States, Voltages};
+use super::glide::Glide;
 use super::heat::Heat;
 use super::path::Path;
 use super::smoothing::Smoothing;
-use super::speed::time_at_s;
 use crate::PlanError;
 use crate::render::track::{angles_around, places};
 use ftheta_model::block::LaserEdge;
@@ -18,12 +18,20 @@ use kurbo::Point;
 /// Changes of power below this part of it are left out.
 const POWER_STEP: f64 = 2e-3;
 
+/// What moves the mirrors between marks.
+pub(super) enum Mover<'a> {
+    /// Voltages, by a servo that is known.
+    Voltage(FlyBy<'a>),
+    /// Angles, followed by any servo after its lag, s.
+    Angle(Glide, f64),
+}
+
 /// A plan that grows.
 pub(super) struct Weave<'a> {
     pub(super) machine: &'a Machine,
     pub(super) inverse: &'a Inverse,
     pub(super) smoothing: &'a Smoothing,
-    pub(super) fly_by: FlyBy<'a>,
+    pub(super) mover: Mover<'a>,
     pub(super) draft: PlanDraft,
     n_samples: u64,
     heat: Heat,
@@ -37,8 +45,8 @@ pub(super) struct Weave<'a> {
 pub(super) struct Stretch {
     pub(super) path: Path,
     pub(super) knots: Vec<Knot>,
-    /// Whole ticks to the stretch's end, if it ends on one; else it goes on for less than a tick.
-    pub(super) n_ticks: Option<u32>,
+    /// Ticks from its first place on; it may go on past the path's end.
+    pub(super) n_ticks: u32,
 }
 
 /// A track that is in the draft's tables, but not yet in its segments.
@@ -55,13 +63,13 @@ impl<'a> Weave<'a> {
         machine: &'a Machine,
         inverse: &'a Inverse,
         smoothing: &'a Smoothing,
-        fly_by: FlyBy<'a>,
+        mover: Mover<'a>,
         heat: Heat,
         draft: PlanDraft,
     ) -> Self {
         let states = [State::zeros(); 2];
         let period_s = machine.output.period_s();
-        Self { machine, inverse, smoothing, fly_by, draft, n_samples: 0, heat, states, period_s }
+        Self { machine, inverse, smoothing, mover, draft, n_samples: 0, heat, states, period_s }
     }
 
     /// Stays in the centre for so many ticks.
@@ -74,9 +82,12 @@ impl<'a> Weave<'a> {
     }
 
     /// Time of the mirrors at the end of what is planned, s: computed voltages act a tick after
-    /// their sample.
+    /// their sample, angles that are sent are reached after the lag.
     pub(super) fn now_s(&self) -> f64 {
-        (self.n_samples + 1) as f64 * self.period_s
+        match &self.mover {
+            Mover::Voltage(_) => (self.n_samples + 1) as f64 * self.period_s,
+            Mover::Angle(_, lag_s) => (self.n_samples as f64 - 1.0) * self.period_s + lag_s,
+        }
     }
 
     pub(super) fn period_s(&self) -> f64 {
@@ -85,14 +96,30 @@ impl<'a> Weave<'a> {
 
     /// Whether the motors stand these voltages from a state, with the heat they have.
     pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States) -> bool {
-        self.fly_by.allows(voltages, from, &self.heat)
+        match &self.mover {
+            Mover::Voltage(fly_by) => fly_by.allows(voltages, from, &self.heat),
+            Mover::Angle(..) => false,
+        }
+    }
+
+    /// Voltages that join states exactly, near the ones given.
+    pub(super) fn corrected(
+        &mut self,
+        voltages: Voltages,
+        from: &States,
+        to: &States,
+    ) -> Option<Voltages> {
+        match &mut self.mover {
+            Mover::Voltage(fly_by) => fly_by.corrected(voltages, from, to),
+            Mover::Angle(..) => None,
+        }
     }
 
     /// Puts a stretch into the tables.
     ///
     /// # Errors
-    /// If the optics do not reach a place of it, or it has too many samples.
-    pub(super) fn lay(&mut self, stretch: &Stretch, place: &str) -> Result<Laid, PlanError> {
+    /// If the optics do not reach a place of it.
+    pub(super) fn lay(&mut self, stretch: &Stretch) -> Result<Laid, PlanError> {
         let draft = &mut self.draft;
         let first_vertex = draft.vertices.len() as u32;
         draft.vertices.extend(&stretch.path.vertices);
@@ -110,12 +137,7 @@ impl<'a> Weave<'a> {
             n_knots: stretch.knots.len() as u32,
             smoothing_ticks: self.smoothing.n_ticks,
         };
-        let duration_s = time_at_s(&stretch.knots, stretch.path.length_mm());
-        let ticks = (duration_s / self.period_s - 1e-6).ceil().max(1.0);
-        if ticks > f64::from(u32::MAX) {
-            return Err(PlanError::TooLong { place: place.into(), value: ticks, limit: u32::MAX });
-        }
-        let n_ticks = stretch.n_ticks.unwrap_or(ticks as u32);
+        let n_ticks = stretch.n_ticks;
         let starts = self.states_at(&motion, 0)?;
         let ends = self.states_at(&motion, n_ticks)?;
         Ok(Laid { motion, n_ticks, starts, ends })
@@ -149,22 +171,29 @@ impl<'a> Weave<'a> {
     }
 
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
-        let Some(voltages) = self.fly_by.between(&self.states, &to, &self.heat)? else {
+        let motion = match &mut self.mover {
+            Mover::Voltage(fly_by) => fly_by.between(&self.states, &to, &self.heat)?,
+            Mover::Angle(glide, _) => glide.between(&self.states, &to),
+        };
+        let Some(pairs) = motion else {
             return Ok(false);
         };
-        self.drive(None, &voltages);
+        self.drive(None, &pairs);
         self.states = to;
         Ok(true)
     }
 
-    /// Appends voltages.
-    pub(super) fn drive(&mut self, mark_index: Option<u32>, voltages: &Voltages) {
+    /// Appends voltages, or angles.
+    pub(super) fn drive(&mut self, mark_index: Option<u32>, pairs: &Voltages) {
         let first = self.draft.drives.len() as u32;
-        self.draft.drives.extend(voltages.iter().map(|pair| pair.map(|volts| volts as f32)));
-        self.push(mark_index, voltages.len() as u32, Motion::Drive { first });
-        for pair in voltages {
+        self.draft.drives.extend(pairs.iter().map(|pair| pair.map(|value| value as f32)));
+        self.push(mark_index, pairs.len() as u32, Motion::Drive { first });
+        let Mover::Voltage(fly_by) = &self.mover else {
+            return;
+        };
+        for pair in pairs {
             for axis in 0..2 {
-                self.states[axis] = self.fly_by.advance(&self.states[axis], pair[axis]);
+                self.states[axis] = fly_by.advance(&self.states[axis], pair[axis]);
             }
             self.heat.tick([self.states[0][CURRENT], self.states[1][CURRENT]]);
         }

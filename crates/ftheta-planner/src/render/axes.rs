@@ -13,6 +13,9 @@ pub(super) struct Axes {
     model: Option<Model>,
     /// State at the tick of the next sample and voltage from it on, while they are known.
     now: Option<[(State, f64); 2]>,
+    /// State a tick later, where a track has just ended: what follows goes on from there, since a
+    /// path that bends sharply at its end is followed only nearly.
+    later: Option<[State; 2]>,
 }
 
 #[derive(Clone)]
@@ -29,16 +32,18 @@ impl Axes {
             Drive::BlackBox => None,
             Drive::ServoKnown | Drive::Voltage => Model::new(machine),
         };
-        Self { model, now: None }
+        Self { model, now: None, later: None }
     }
 
     /// The axes rest at these angles.
     pub(super) fn rest(&mut self, angles_rad: [f64; 2]) {
+        self.later = None;
         self.now = Some(angles_rad.map(|rad| (State::new(rad, 0.0, 0.0, 0.0, 0.0), 0.0)));
     }
 
     /// The axes follow words that were not computed.
     pub(super) fn forget(&mut self) {
+        self.later = None;
         self.now = None;
     }
 
@@ -54,12 +59,17 @@ impl Axes {
             return next;
         };
         let mut angles_rad = next;
-        for ((state, acting_v), rad) in now.iter_mut().zip(&mut angles_rad) {
-            let next_v = *rad;
+        let later = self.later.take();
+        for (axis, (state, acting_v)) in now.iter_mut().enumerate() {
+            let next_v = next[axis];
             let reference_rad = model.gains.reference_rad(state, *acting_v, next_v);
-            *state = model.step.a * *state + model.step.b * *acting_v;
+            *state = match later {
+                Some(later) => later[axis],
+                None => model.step.a * *state + model.step.b * *acting_v,
+            };
             *acting_v = next_v;
-            *rad = reference_rad.expect("a model is only made of a servo that has a reference");
+            angles_rad[axis] =
+                reference_rad.expect("a model is only made of a servo that has a reference");
         }
         angles_rad
     }
@@ -84,6 +94,7 @@ impl Axes {
         let left = angles_rad.map(|angles| &angles[n_joints..n_samples + N_TAPS - 1]);
         let reference = model.reference;
         let end = last.then(|| state(&model.inverse, angles_rad, n_samples));
+        let after = last.then(|| state(&model.inverse, angles_rad, n_samples + 1));
         if n_joints == 1 {
             // The first command joins what was before to the first voltage of the track.
             let voltages_v = state(&model.inverse, angles_rad, 1).map(|(_, voltage_v)| voltage_v);
@@ -91,6 +102,7 @@ impl Axes {
         }
         references(&reference, left).for_each(push);
         self.now = end;
+        self.later = after.map(|axes| axes.map(|(state, _)| state));
     }
 }
 

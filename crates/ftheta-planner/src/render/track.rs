@@ -65,14 +65,14 @@ impl Track {
     }
 
     /// Wanted mirror angles of so many samples that come next, with those that the weights need
-    /// around them: sample i has angles i .. i + N_TAPS. One sample more than asked for is there.
+    /// around them: sample i has angles i .. i + N_TAPS. Two samples more than asked for are there.
     pub(super) fn angles(
         &mut self,
         plan: &PlanDraft,
         words: &Words<'_>,
         n_samples: usize,
     ) -> [&[f64]; 2] {
-        let n_angles = n_samples + N_TAPS;
+        let n_angles = n_samples + 1 + N_TAPS;
         let n_places = n_angles + 3 * (self.smoothing_ticks - 1);
         let tick_s = plan.machine.output.period_s();
         let Buffers { x, y } = &mut self.buffers;

@@ -27,6 +27,11 @@ impl<'a> Words<'a> {
         Self { plan, table, words_per_rad: 1.0 / plan.machine.output.word_step_rad() }
     }
 
+    /// The same for another plan of the same machine.
+    pub(super) fn for_plan<'b>(&self, plan: &'b Plan) -> Words<'b> {
+        Words { plan, table: self.table.clone(), words_per_rad: self.words_per_rad }
+    }
+
     /// The word pair for a place.
     #[inline]
     pub(super) fn at(&self, place: Point) -> DacCodes {
