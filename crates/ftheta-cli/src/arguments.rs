@@ -32,6 +32,8 @@ pub enum Command {
     Jump(Jump),
     /// Mark one uniform turn of a circle or ellipse on the twin, and measure how true it is.
     Circle(Circle),
+    /// Write a pattern to judge a head by, and show on the twin what comes of it.
+    Pattern(Pattern),
     /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv).
     Convert(Convert),
     /// List, show and check machines.
@@ -272,6 +274,54 @@ pub struct Circle {
     pub out: Option<PathBuf>,
 }
 
+#[derive(Args)]
+pub struct Pattern {
+    #[command(subcommand)]
+    pub kind: PatternKind,
+}
+
+#[derive(Subcommand)]
+pub enum PatternKind {
+    /// The ILDA test pattern: planned, beside what comes of its points played at a constant rate.
+    Ilda(IldaPattern),
+}
+
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(
+    after_help = "Example: ftheta pattern ilda --machine S10-f160 --out ilda.svg --report ilda"
+)]
+pub struct IldaPattern {
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Side of the pattern, mm; eight optical degrees if not given.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub field: Option<f64>,
+    /// Drawing to write, .svg; the features' nominal places go beside it, .json.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Folder for pattern.html and plan.ftheta.
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Speed at which the pattern is planned, mm/s.
+    #[arg(long, value_name = "MM_S", default_value = "3000", value_parser = positive)]
+    pub speed: f64,
+    /// Rate at which its points are played, 1/s.
+    #[arg(long, value_name = "N", default_value = "30000", value_parser = rate)]
+    pub points_per_s: f64,
+    /// Greatest distance of the planned beam from the pattern, µm.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
+    pub tolerance_um: f64,
+    /// Folder for jump atlases, so that they are built once; the system's cache if not given.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.
+    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
+          value_parser = mismatch, allow_hyphen_values = true)]
+    pub mismatch: Mismatch,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 pub enum PlannerName {
     /// Marks at constant dose, between them the fastest motion that motors and resonance allow.
@@ -320,6 +370,10 @@ fn positive(text: &str) -> Result<f64, String> {
 
 fn ratio(text: &str) -> Result<f64, String> {
     within(number(text)?, 0.05..=20.0)
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    within(number(text)?, 100.0..=1e6)
 }
 
 fn pair(text: &str) -> Result<[f64; 2], String> {

@@ -6,6 +6,7 @@ pub mod jump;
 pub mod machine;
 pub mod mark;
 pub mod mechanism;
+pub mod pattern;
 pub mod verify;
 
 use crate::arguments::Arguments;

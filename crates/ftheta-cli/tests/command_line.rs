@@ -378,3 +378,35 @@ fn a_circle_is_true_and_uniform() {
     let fault = bench.fault(&["circle", "--radius-mm", "0.5", "--speed", "50000"]);
     assert!(fault["where"].as_str().unwrap().starts_with("circle"), "{fault}");
 }
+
+#[test]
+fn a_pattern_is_written_and_compared() {
+    let bench = Bench::new();
+    let (code, value) = bench.json(&[
+        "pattern",
+        "ilda",
+        "--machine",
+        "S10-f160",
+        "--field",
+        "5",
+        "--speed",
+        "1000",
+        "--out",
+        "ilda.svg",
+        "--report",
+        "ilda",
+        "--cache",
+        "cache",
+    ]);
+    assert_eq!(code, 0, "{value}");
+    assert!(value["planned"]["error_um"]["max"].as_f64().unwrap() <= 10.0, "{value}");
+    assert_eq!(value["played"].as_array().unwrap().len(), 2, "{value}");
+    let features: Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("ilda.json")).unwrap()).unwrap();
+    assert_eq!(features["kind"], "ilda");
+    assert_eq!(features["features"].as_array().unwrap().len(), 15);
+    assert!(bench.path("ilda").join("pattern.html").exists());
+    // The drawing is one like any other.
+    let (code, converted) = bench.json(&["convert", "ilda.svg", "ilda.csv"]);
+    assert_eq!(code, 0, "{converted}");
+}

@@ -15,6 +15,7 @@ pub mod machines;
 pub mod mark;
 pub mod mechanism;
 pub mod output;
+pub mod pattern;
 mod planning;
 pub mod results;
 pub mod verify;
