@@ -92,13 +92,14 @@ pub fn draft(
     let period_s = machine.output.period_s();
     let harmonics = Harmonics::new(machine, ellipse)?;
     let turn_s = ellipse.length_mm() / ellipse.speed_mm_s;
-    let (run_in, start) = run_in(machine, &harmonics, options)?;
+    let passages = Passages::new(machine, options);
+    let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
+    let (run_in, start) = run_in(&passages, &harmonics, epsilon_rad)?;
     let n_turn = (turn_s / period_s - 1e-9).ceil() as usize;
     let phase = |tick: usize| start + tick as f64 * period_s / turn_s;
     let turn: Voltages = (0..n_turn).map(|tick| harmonics.voltages_v(phase(tick))).collect();
-    let run_out =
-        passage(machine, options, Model::Flexible, [harmonics.states(phase(n_turn)), REST], 1)?
-            .ok_or_else(no_room)?;
+    let way_out = [harmonics.states(phase(n_turn)), REST];
+    let run_out = passages.between(Model::Flexible, way_out, 1)?.ok_or_else(no_room)?;
     let laser = &machine.laser;
     let lead_ns = laser.on_latency_ns.max(0) as u64;
     let n_first = 1 + lead_ns.div_ceil(u64::from(machine.output.period_ns)) as u32;
@@ -144,46 +145,57 @@ pub fn draft(
 }
 
 /// The shortest way from rest in the centre into the ellipse, and the turns at which it gets there.
+///
+/// * `epsilon_rad`: how far a mirror may be off after it, on any motor within the uncertainties
 fn run_in(
-    machine: &Machine,
+    passages: &Passages,
     harmonics: &Harmonics,
-    options: &CircleOptions,
+    epsilon_rad: f64,
 ) -> Result<(Voltages, f64), PlanError> {
     let mut best: Option<(usize, f64)> = None;
     for start in (0..N_STARTS).map(|index| f64::from(index) / f64::from(N_STARTS)) {
         let way = [REST, harmonics.states(start)];
-        if let Some(found) = passage(machine, options, Model::Flexible, way, 1)?
+        if let Some(found) = passages.between(Model::Flexible, way, 1)?
             && best.is_none_or(|(n_ticks, _)| found.len() < n_ticks)
         {
             best = Some((found.len(), start));
         }
     }
     let (n_ticks, start) = best.ok_or_else(no_room)?;
-    let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
     let way = [REST, harmonics.states(start)];
-    let held = passage(machine, options, Model::Held { epsilon_rad }, way, n_ticks)?;
+    let held = passages.between(Model::Held { epsilon_rad }, way, n_ticks)?;
     Ok((held.ok_or_else(no_room)?, start))
 }
 
-/// The voltages of both axes from states to states in the fewest ticks, from some number on.
-fn passage(
-    machine: &Machine,
-    options: &CircleOptions,
-    model: Model,
-    [from, to]: [States; 2],
-    n_ticks_min: usize,
-) -> Result<Option<Voltages>, JumpError> {
-    let axis = AxisOptions {
-        model,
-        tick_s: machine.output.period_s(),
-        voltage_reserve: options.voltage_reserve,
-        current_bound: CurrentBound::Always,
-    };
-    let angle_max_rad = (1.0 - CORRECTION_RESERVE) * machine.scanner.angle_max_rad;
-    let scanner = Scanner { angle_max_rad, ..machine.scanner.clone() };
-    let passages = [0, 1].map(|axis| Passage { from: from[axis], to: to[axis] });
-    let found = fewest_ticks_of_passages(&scanner, axis, &passages, n_ticks_min)?;
-    Ok(found.map(|axes| axes[0].iter().zip(&axes[1]).map(|(x, y)| [*x, *y]).collect()))
+/// Solves motion between states of both axes.
+struct Passages {
+    scanner: Scanner,
+    tick_s: f64,
+    voltage_reserve: f64,
+}
+
+impl Passages {
+    fn new(machine: &Machine, options: &CircleOptions) -> Self {
+        let angle_max_rad = (1.0 - CORRECTION_RESERVE) * machine.scanner.angle_max_rad;
+        let scanner = Scanner { angle_max_rad, ..machine.scanner.clone() };
+        let tick_s = machine.output.period_s();
+        Self { scanner, tick_s, voltage_reserve: options.voltage_reserve }
+    }
+
+    /// The voltages in the fewest ticks, from some number on.
+    fn between(
+        &self,
+        model: Model,
+        [from, to]: [States; 2],
+        n_ticks_min: usize,
+    ) -> Result<Option<Voltages>, JumpError> {
+        let Self { tick_s, voltage_reserve, .. } = *self;
+        let current_bound = CurrentBound::Always;
+        let axis = AxisOptions { model, tick_s, voltage_reserve, current_bound };
+        let passages = [0, 1].map(|axis| Passage { from: from[axis], to: to[axis] });
+        let found = fewest_ticks_of_passages(&self.scanner, axis, &passages, n_ticks_min)?;
+        Ok(found.map(|axes| axes[0].iter().zip(&axes[1]).map(|(x, y)| [*x, *y]).collect()))
+    }
 }
 
 fn no_room() -> PlanError {

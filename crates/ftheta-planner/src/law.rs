@@ -34,7 +34,8 @@ const N_TUNINGS: usize = 8;
 pub enum Law {
     /// Fewest ticks on the nominal axis, ending exactly at rest.
     Optimal,
-    /// Fewest ticks that also stand the machine's uncertainty of mode and damping.
+    /// Fewest ticks that also stand the machine's uncertainty of mode and damping; from rest to
+    /// rest with all of the tolerance used, so that the place of rest may be off the target too.
     Robust,
     /// Equal segments of constant voltage, the action time found by bisection.
     ///

@@ -1,11 +1,10 @@
 //! One uniform turn of a circle or ellipse, planned, played on the twin and measured.
 
 use crate::Error;
+use crate::lit::Lit;
 use crate::mark::{MarkOptions, Marked, PlanTimes, Played, Stage, plan_times, play_watched};
 use ftheta_model::machine::Machine;
 use ftheta_model::recipe::{ClassicRecipe, Pen};
-use ftheta_model::space::FieldPoint;
-use ftheta_model::trace::Trace;
 use ftheta_physics::plan::Plan;
 pub use ftheta_planner::circle::Ellipse;
 use ftheta_planner::circle::{self, CircleOptions};
@@ -65,9 +64,9 @@ pub fn circle(
         circle::draft(machine, ellipse, &CircleOptions { pen, tolerance_mm, voltage_reserve })?;
     observer(Stage::Audit);
     let plan = Plan::new(planned.draft)?;
-    let mut turn = Turn { ellipse: *ellipse, lit: Vec::new(), step_s: 0.0 };
+    let mut lit = Lit::default();
     let Played { score, dose, states } =
-        play_watched(&plan, options, observer, &mut |trace| turn.add(trace))?;
+        play_watched(&plan, options, observer, &mut |trace| lit.add(trace))?;
     let times = PlanTimes { marked_mm: ellipse.length_mm(), ..plan_times(&plan) };
     let (seed, warnings) = (options.seed, Vec::new());
     Ok(Circled {
@@ -75,47 +74,25 @@ pub fn circle(
         run_in_s: planned.run_in_s,
         run_out_s: planned.run_out_s,
         turn_s: planned.turn_s,
-        roundness: turn.roundness(),
+        roundness: roundness(&lit, ellipse),
     })
 }
 
-/// The lit part of a trace.
-struct Turn {
-    ellipse: Ellipse,
-    lit: Vec<Point>,
-    step_s: f64,
-}
-
-impl Turn {
-    fn add(&mut self, trace: &Trace) {
-        self.step_s = trace.step_ns as f64 * 1e-9;
-        for light in &trace.light {
-            // The first point of a stretch was the last of the stretch before.
-            let first = light.on_ns.div_ceil(trace.step_ns).saturating_sub(trace.first_index);
-            let first = first.max(u64::from(!self.lit.is_empty()));
-            let end = (light.off_ns / trace.step_ns + 1).saturating_sub(trace.first_index);
-            let lit = trace.points.iter().take(end as usize).skip(first as usize);
-            self.lit.extend(lit.map(|point| {
-                let place = FieldPoint::from(*point);
-                Point::new(place.x_mm, place.y_mm)
-            }));
-        }
-    }
-
-    fn roundness(&self) -> Roundness {
-        let errors_mm = || self.lit.iter().map(|point| self.ellipse.distance_mm(*point));
-        let squares: f64 = errors_mm().map(|error| error * error).sum();
-        let ways_mm: Vec<f64> = self.lit.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-        let step_mm = self.ellipse.speed_mm_s * self.step_s;
-        let n_steps = ((SPEED_WAY_MM / step_mm).ceil() as usize).clamp(1, ways_mm.len().max(1));
-        let speeds = ways_mm
-            .windows(n_steps)
-            .map(|ways_mm| ways_mm.iter().sum::<f64>() / (n_steps as f64 * step_mm));
-        Roundness {
-            error_max_mm: errors_mm().fold(0.0, |max, error| max.max(error.abs())),
-            error_rms_mm: (squares / self.lit.len().max(1) as f64).sqrt(),
-            speed_ratio: speeds
-                .fold([f64::INFINITY, 0.0], |[min, max], speed| [min.min(speed), max.max(speed)]),
-        }
+/// How true the lit places are to an ellipse.
+fn roundness(lit: &Lit, ellipse: &Ellipse) -> Roundness {
+    let errors_mm = || lit.places.iter().map(|(_, place)| ellipse.distance_mm(*place));
+    let squares: f64 = errors_mm().map(|error| error * error).sum();
+    let way_mm = |pair: &[(usize, Point)]| pair[0].1.distance(pair[1].1);
+    let ways_mm: Vec<f64> = lit.places.windows(2).map(way_mm).collect();
+    let step_mm = ellipse.speed_mm_s * lit.step_s;
+    let n_steps = ((SPEED_WAY_MM / step_mm).ceil() as usize).clamp(1, ways_mm.len().max(1));
+    let speeds = ways_mm
+        .windows(n_steps)
+        .map(|ways_mm| ways_mm.iter().sum::<f64>() / (n_steps as f64 * step_mm));
+    Roundness {
+        error_max_mm: errors_mm().fold(0.0, |max, error| max.max(error.abs())),
+        error_rms_mm: (squares / lit.places.len().max(1) as f64).sqrt(),
+        speed_ratio: speeds
+            .fold([f64::INFINITY, 0.0], |[min, max], speed| [min.min(speed), max.max(speed)]),
     }
 }

@@ -11,6 +11,7 @@ pub mod error;
 pub mod import;
 pub mod jump;
 pub mod jump_results;
+mod lit;
 pub mod machines;
 pub mod mark;
 pub mod mechanism;

@@ -154,25 +154,13 @@ pub fn mark(
     options: &MarkOptions,
     observer: &mut dyn FnMut(Stage),
 ) -> Result<Marked, Error> {
-    mark_watched(job, machine, recipe, options, observer, &mut |_| {})
-}
-
-/// The same, with every stretch of the trace shown to `watch`.
-pub(crate) fn mark_watched(
-    job: &Job,
-    machine: &Machine,
-    recipe: &Recipe,
-    options: &MarkOptions,
-    observer: &mut dyn FnMut(Stage),
-    watch: &mut dyn FnMut(&Trace),
-) -> Result<Marked, Error> {
     observer(Stage::Lay);
     let Imported { value: toolpath, mut warnings } = lay_out(job, machine, recipe, options)?;
     observer(Stage::Plan);
     let settings = Settings::new(machine, &recipe.classic)?;
     let planning = Planning { machine, settings: &settings, options };
     let plan = planning.plan(toolpath, &mut warnings, observer)?;
-    let Played { score, dose, states } = play_watched(&plan, options, observer, watch)?;
+    let Played { score, dose, states } = play(&plan, options, observer)?;
     warnings.extend(shortcomings(&plan, &score));
     let times = plan_times(&plan);
     let seed = options.seed;

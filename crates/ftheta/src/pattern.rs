@@ -8,13 +8,12 @@
 mod playback;
 
 use crate::Error;
-use crate::mark::{MarkOptions, Marked, Stage, mark_watched};
+use crate::lit::Lit;
+use crate::mark::{MarkOptions, Marked, Stage, mark, play_watched};
 use crate::output::Output;
 use ftheta_model::job::{Job, Layer, Paint, Shape};
 use ftheta_model::machine::Machine;
 use ftheta_model::recipe::{Pen, Recipe};
-use ftheta_model::space::FieldPoint;
-use ftheta_model::trace::Trace;
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_report::pattern_report::{PatternReportInput, PatternWay, pattern_report_html};
 use ftheta_report::plate::{PlateOptions, plate_png};
@@ -75,7 +74,7 @@ pub struct Way {
 /// The pattern planned, and its points played.
 pub struct Comparison {
     /// Plan, score and picture.
-    pub planned: Planned,
+    pub planned: Marked,
     /// Planned, played at the rate asked for, played in the time of the plan.
     pub ways: Vec<Way>,
     /// Rate at which the circle touches the square, if it is small, points/s.
@@ -95,30 +94,25 @@ impl Way {
 /// Plans the pattern, and plays its points at a rate and in the plan's own time.
 ///
 /// # Errors
-/// As [`Ilda::plan`].
+/// As [`mark`].
 pub fn compare(
     ilda: &Ilda,
     machine: &Machine,
-    pen: &Pen,
-    points_per_s: f64,
-    options: &MarkOptions,
+    options: &PatternOptions,
     observer: &mut dyn FnMut(Stage),
 ) -> Result<Comparison, Error> {
-    let planned = ilda.plan(machine, pen.clone(), options, observer)?;
-    let plate =
-        PlateOptions { page_mm: Some([1.1 * ilda.side_mm(); 2]), longest_side_px: PICTURE_PX };
-    let mut ways = vec![Way {
-        points_per_s: None,
-        traced: planned.traced.clone(),
-        picture_png: plate_png(&planned.marked.dose, &plate),
-    }];
-    let slow = playback::n_points(ilda) as f64 / planned.traced.duration_s;
-    for rate in [points_per_s, slow] {
-        let (traced, dose) = playback::playback(ilda, machine, rate, pen.power_w, options)?;
+    let (planned, traced) = ilda.plan(machine, options, observer)?;
+    let page_mm = Some([1.1 * ilda.side_mm(); 2]);
+    let plate = PlateOptions { page_mm, longest_side_px: PICTURE_PX };
+    let slow = playback::n_points(ilda) as f64 / traced.duration_s;
+    let picture_png = plate_png(&planned.dose, &plate);
+    let mut ways = vec![Way { points_per_s: None, traced, picture_png }];
+    for rate in [options.points_per_s, slow] {
+        let (traced, dose) = playback::playback(ilda, machine, rate, options)?;
         let picture_png = plate_png(&dose, &plate);
         ways.push(Way { points_per_s: Some(rate), traced, picture_png });
     }
-    Ok(Comparison { planned, ways, tuned_rate: playback::tuned_rate(machine) })
+    Ok(Comparison { planned, ways, tuned_rate: tuned_rate(machine) })
 }
 
 impl Comparison {
@@ -127,7 +121,7 @@ impl Comparison {
     /// # Errors
     /// If a file cannot be written.
     pub fn add(&self, output: &mut Output) -> Result<Vec<(&'static str, String)>, Error> {
-        let plan = &self.planned.marked.plan;
+        let plan = &self.planned.plan;
         let way = |way: &Way| PatternWay {
             name: way.name(),
             duration_s: way.traced.duration_s,
@@ -158,12 +152,15 @@ impl Comparison {
     }
 }
 
-/// The pattern as it was planned and played.
-pub struct Planned {
-    /// Plan, score, picture.
-    pub marked: Marked,
-    /// How well it was followed.
-    pub traced: Traced,
+/// How the pattern is made.
+#[derive(Clone, Debug)]
+pub struct PatternOptions {
+    /// Power, and the speed of the plan.
+    pub pen: Pen,
+    /// Rate at which points are played, 1/s.
+    pub points_per_s: f64,
+    /// How it is planned, and what the twin is told.
+    pub mark: MarkOptions,
 }
 
 impl Ilda {
@@ -223,25 +220,19 @@ impl Ilda {
     }
 
     /// Plans the pattern and plays it on the twin.
-    ///
-    /// # Errors
-    /// As [`crate::mark::mark`].
-    pub fn plan(
+    fn plan(
         &self,
         machine: &Machine,
-        pen: Pen,
-        options: &MarkOptions,
+        options: &PatternOptions,
         observer: &mut dyn FnMut(Stage),
-    ) -> Result<Planned, Error> {
+    ) -> Result<(Marked, Traced), Error> {
+        let (job, recipe) = (self.job(options.pen.clone()), Recipe::default());
+        let marked = mark(&job, machine, &recipe, &options.mark, observer)?;
         let mut lit = Lit::default();
-        let job = self.job(pen);
-        let marked =
-            mark_watched(&job, machine, &Recipe::default(), options, observer, &mut |trace| {
-                lit.add(trace)
-            })?;
+        play_watched(&marked.plan, &options.mark, &mut |_| {}, &mut |trace| lit.add(trace))?;
         let circle = marked.plan.marks.iter().position(|mark| mark.source == "circle");
         let traced = self.traced(&lit, circle, marked.times.duration_s);
-        Ok(Planned { marked, traced })
+        Ok((marked, traced))
     }
 
     /// Distance of a place from the pattern, mm.
@@ -293,24 +284,4 @@ fn path(features: &[Feature]) -> BezPath {
         }
     }
     path
-}
-
-/// Places of the beam in light, with the interval they belong to.
-#[derive(Default)]
-struct Lit {
-    places: Vec<(usize, Point)>,
-}
-
-impl Lit {
-    fn add(&mut self, trace: &Trace) {
-        for light in &trace.light {
-            let first = light.on_ns.div_ceil(trace.step_ns).saturating_sub(trace.first_index);
-            let end = (light.off_ns / trace.step_ns + 1).saturating_sub(trace.first_index);
-            let points = trace.points.iter().take(end as usize).skip(first as usize);
-            self.places.extend(points.map(|point| {
-                let place = FieldPoint::from(*point);
-                (light.index, Point::new(place.x_mm, place.y_mm))
-            }));
-        }
-    }
 }

@@ -7,7 +7,7 @@ use ftheta_formats::machine::preset;
 use ftheta_model::machine::{Drive, Machine};
 use ftheta_model::recipe::Pen;
 use ftheta_twin::mismatch::Mismatch;
-use kurbo::Point;
+use kurbo::{Point, Shape};
 
 fn machine(name: &str, word_bits: u32) -> Machine {
     let mut machine = preset(name).unwrap().unwrap();
@@ -57,6 +57,15 @@ fn a_fast_ellipse_is_uniform() {
     let roundness = turn(&machine("S10-f160", 20), &ellipse).roundness;
     let [low, high] = roundness.speed_ratio;
     assert!(roundness.error_max_mm <= 1e-4 && 0.995 <= low && high <= 1.005, "{roundness:?}");
+}
+
+#[test]
+fn ellipses_are_as_long_as_they_are() {
+    for ratio in [1.0, 2.0, 20.0] {
+        let length_mm = at_centre([1.0, 1.0 / ratio], 1.0).length_mm();
+        let known_mm = kurbo::Ellipse::new(Point::ZERO, (1.0, 1.0 / ratio), 0.0).perimeter(1e-12);
+        assert!((length_mm / known_mm - 1.0).abs() < 1e-9, "1:{ratio}: {length_mm} {known_mm}");
+    }
 }
 
 /// A motor that is not quite the nominal one is held by the servo.

@@ -8,7 +8,7 @@ use ftheta::atlas_store::AtlasStore;
 use ftheta::mark::MarkOptions;
 use ftheta::model::recipe::Pen;
 use ftheta::output::{Output, write_file};
-use ftheta::pattern::{Comparison, Feature, Ilda, Way, compare};
+use ftheta::pattern::{Comparison, Feature, Ilda, PatternOptions, Way, compare};
 use ftheta::{Error, convert, machines};
 use serde_json::{Value, json};
 
@@ -23,7 +23,7 @@ fn run_ilda(arguments: &IldaPattern, as_json: bool) -> Result<(), Error> {
     let mut progress = Progress::new("plan");
     let machine = machines::find(&arguments.machine)?;
     let ilda = Ilda::new(&machine, arguments.field);
-    let options = MarkOptions {
+    let mark = MarkOptions {
         atlas_store: AtlasStore::new(arguments.cache.clone()),
         tolerance_mm: arguments.tolerance_um * 1e-3,
         mismatch: arguments.mismatch,
@@ -31,10 +31,9 @@ fn run_ilda(arguments: &IldaPattern, as_json: bool) -> Result<(), Error> {
     };
     let pen = Pen { mark_speed_mm_s: arguments.speed, ..Pen::default() };
     let mut output = arguments.report.as_deref().map(Output::new).transpose()?;
-    let rate = arguments.points_per_s;
-    let observer = &mut |stage| progress.observe(stage);
-    let compared = compare(&ilda, &machine, &pen, rate, &options, observer)?;
-    convert::write(&ilda.job(pen), &Default::default(), &arguments.out)?;
+    let options = PatternOptions { pen, points_per_s: arguments.points_per_s, mark };
+    let compared = compare(&ilda, &machine, &options, &mut |stage| progress.observe(stage))?;
+    convert::write(&ilda.job(options.pen), &Default::default(), &arguments.out)?;
     let features = arguments.out.with_extension("json");
     let described = description(&ilda, &machine.name, arguments.speed);
     write_file(&features, described.to_string().as_bytes())?;
@@ -92,7 +91,7 @@ fn object(ilda: &Ilda, compared: &Comparison, files: &[(&str, String)]) -> Value
     };
     let files: Value = files.iter().map(|(kind, path)| ((*kind).to_owned(), json!(path))).collect();
     json!({
-        "machine": compared.planned.marked.plan.machine.name,
+        "machine": compared.planned.plan.machine.name,
         "field_mm": ilda.side_mm(),
         "ilda_points_per_s": compared.tuned_rate,
         "planned": way(&compared.ways[0]),

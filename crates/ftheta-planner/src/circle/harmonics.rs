@@ -16,8 +16,8 @@ const N_PLACES: usize = 512;
 const RATE_SHARE: f64 = 0.25;
 /// Smaller ones are rounding of the optics, rad.
 const SMALLEST_RAD: f64 = 1e-14;
-/// Fewest ticks of a turn.
-const N_TICKS_MIN: f64 = 10.0;
+/// Fewest and most ticks of a turn.
+const N_TICKS: (f64, f64) = (10.0, 1e7);
 /// Steps of Newton's method, which doubles its digits.
 const N_NEWTON: usize = 6;
 /// Distance of the stored curve from the true one, mm: what a trace resolves.
@@ -50,7 +50,7 @@ impl Ellipse {
     /// Its length, mm.
     ///
     /// # Accuracy
-    /// 1e-12 of it up to axes of 1:20.
+    /// 1e-9 of it up to axes of 1:20.
     pub fn length_mm(&self) -> f64 {
         let step = TAU / N_PLACES as f64;
         (0..N_PLACES).map(|index| self.arc_mm(index as f64 * step, step)).sum()
@@ -116,13 +116,14 @@ impl Ellipse {
 impl Harmonics {
     pub(super) fn new(machine: &Machine, ellipse: &Ellipse) -> Result<Self, PlanError> {
         let turn_ticks = ellipse.length_mm() / ellipse.speed_mm_s / machine.output.period_s();
-        if turn_ticks.is_nan() || turn_ticks < N_TICKS_MIN {
+        let (low, high) = N_TICKS;
+        if !(low..=high).contains(&turn_ticks) {
             return Err(PlanError::Setting {
                 place: "circle".into(),
                 quantity: "samples of a turn",
                 value: turn_ticks,
-                low: N_TICKS_MIN,
-                high: f64::from(u32::MAX),
+                low,
+                high,
                 unit: "",
             });
         }

@@ -35,7 +35,7 @@ struct Watch {
 
 /// Enough for an atlas, whose sequences are solved by the hundred.
 const ROBUST: Watch = Watch { n_frequencies: 7, looks: &[0.0, 0.5, 1.0], error_share: 0.95 };
-/// What remains to be had costs ten times the work. The last look is at rest.
+/// What remains to be had costs four times the work. The last look is at rest.
 const CLOSEST: Watch = Watch {
     n_frequencies: 13,
     looks: &[0.0, 0.25, 0.5, 0.75, 0.9, 1.05, 1.3, 3.0, 30.0],
@@ -57,7 +57,7 @@ pub enum Model {
         epsilon_rad: f64,
     },
     /// As robust, with all of the tolerance used: plants and times are closer, and the place of
-    /// rest may be off the target too. Single steps, not atlases: a program takes seconds.
+    /// rest may be off the target too. Single steps, not atlases, whose jumps end at their target.
     Closest {
         /// Allowed end error, rad mechanical.
         epsilon_rad: f64,

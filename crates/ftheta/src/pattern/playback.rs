@@ -1,11 +1,12 @@
-//! Points played as show lasers do: one after the other at a constant rate, whatever the mirrors do.
+//! Points played as show lasers do: at a constant rate, whatever the mirrors do.
 
-use super::{CIRCLE_GAIN, Feature, Ilda, Lit, Traced};
+use super::{CIRCLE_GAIN, Feature, Ilda, PatternOptions, Traced};
 use crate::Error;
-use crate::mark::{MarkOptions, twin};
+use crate::lit::Lit;
+use crate::mark::twin;
 use ftheta_model::block::{Block, LaserEdge, SampleSink};
 use ftheta_model::dose::DoseMap;
-use ftheta_model::machine::Machine;
+use ftheta_model::machine::{Laser, Machine};
 use ftheta_model::space::DacCodes;
 use ftheta_physics::axis_loop::response;
 use ftheta_physics::galvo::Galvo;
@@ -32,7 +33,8 @@ struct Sent {
     lit: bool,
 }
 
-/// What comes of the pattern's points, played at this rate on the twin, and the energy on the plane.
+/// What comes of the pattern's points, played at this rate on the twin, and the energy on the
+/// plane.
 ///
 /// Light comes a servo's lag late, as on a tuned projector, and goes on time, since strokes end at
 /// rest.
@@ -41,52 +43,58 @@ struct Sent {
 /// If the optics do not reach a point, or the servo cannot be built.
 ///
 /// * `rate`: points per second
-/// * `power_w`: of the light
 pub(super) fn playback(
     ilda: &Ilda,
     machine: &Machine,
     rate: f64,
-    power_w: f64,
-    options: &MarkOptions,
+    options: &PatternOptions,
 ) -> Result<(Traced, DoseMap), Error> {
     let (points, circle) = points(ilda);
     let period_s = machine.output.period_s();
     let gains = Gains::design(&machine.scanner, period_s)?;
     let lag_s = gains.lag_s(&Galvo::new(&machine.scanner));
-    let mut words = Vec::with_capacity(points.len());
-    for point in &points {
-        words.push(word(machine, point.place)?);
-    }
+    let words: Vec<DacCodes> =
+        points.iter().map(|point| word(machine, point.place)).collect::<Result<_, _>>()?;
     let duration_s = points.len() as f64 / rate;
     // Until the last light has gone out.
     let n_samples = ((duration_s + 2.0 * lag_s) / period_s).ceil() as usize;
     let at = |sample: usize| ((sample as f64 * period_s * rate) as usize).min(words.len() - 1);
-    let mut edges = Vec::new();
-    let mut lit = false;
-    for (index, point) in points.iter().enumerate() {
-        if point.lit != lit {
-            lit = point.lit;
-            let late_s = if lit { lag_s } else { 0.0 };
-            let light_ns = ((index as f64 / rate + late_s) * 1e9).round() as i64;
-            let laser = &machine.laser;
-            let latency_ns = if lit { laser.on_latency_ns } else { laser.off_latency_ns };
-            let power_w = if lit { power_w } else { 0.0 };
-            edges.push(LaserEdge { time_ns: (light_ns - latency_ns).max(0) as u64, power_w });
-        }
-    }
-    let block =
-        Block { first_index: 0, words: (0..n_samples).map(|i| words[at(i)]).collect(), edges };
+    let power_w = options.pen.power_w;
+    let block = Block {
+        first_index: 0,
+        words: (0..n_samples).map(|sample| words[at(sample)]).collect(),
+        edges: edges(&points, &machine.laser, rate, lag_s)
+            .map(|(time_ns, lit)| LaserEdge { time_ns, power_w: if lit { power_w } else { 0.0 } })
+            .collect(),
+    };
     let twin_options = TwinOptions {
-        mismatch: options.mismatch,
-        seed: options.seed,
+        mismatch: options.mark.mismatch,
+        seed: options.mark.seed,
         pixel_mm: machine.laser.spot_diameter_mm / 3.0,
         state_stride: u64::MAX,
     };
-    let mut twin = twin(machine, options, &twin_options)?;
+    let mut twin = twin(machine, &options.mark, &twin_options)?;
     twin.push(&block)?;
-    let mut seen = Lit::default();
-    seen.add(&twin.take_trace());
-    Ok((ilda.traced(&seen, Some(circle), duration_s), twin.into_dose()))
+    let mut lit = Lit::default();
+    lit.add(&twin.take_trace());
+    Ok((ilda.traced(&lit, Some(circle), duration_s), twin.into_dose()))
+}
+
+/// When light goes on and off, ns.
+fn edges(
+    points: &[Sent],
+    laser: &Laser,
+    rate: f64,
+    lag_s: f64,
+) -> impl Iterator<Item = (u64, bool)> {
+    let changes = points.windows(2).enumerate().filter(|(_, pair)| pair[0].lit != pair[1].lit);
+    changes.map(move |(index, pair)| {
+        let lit = pair[1].lit;
+        let (late_s, latency_ns) =
+            if lit { (lag_s, laser.on_latency_ns) } else { (0.0, laser.off_latency_ns) };
+        let light_ns = (((index + 1) as f64 / rate + late_s) * 1e9).round() as i64;
+        ((light_ns - latency_ns).max(0) as u64, lit)
+    })
 }
 
 /// Number of the pattern's points.
