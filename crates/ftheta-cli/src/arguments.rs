@@ -30,6 +30,10 @@ pub enum Command {
     Verify(Verify),
     /// Show how fast a machine can jump, and how near each law comes to that on the twin.
     Jump(Jump),
+    /// Mark one uniform turn of a circle or ellipse on the twin, and measure how true it is.
+    Circle(Circle),
+    /// Write a pattern to judge a head by, and show on the twin what comes of it.
+    Pattern(Pattern),
     /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv).
     Convert(Convert),
     /// List, show and check machines.
@@ -233,6 +237,91 @@ pub struct Mechanism {
     pub response: Option<PathBuf>,
 }
 
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(after_help = "\
+Examples:
+  ftheta circle --radius-mm 0.5 --speed 2000 --machine S10-f160
+  ftheta circle --radius-mm 2 --ellipse 2 --speed 3000 --out ellipse")]
+pub struct Circle {
+    /// Radius, mm; of an ellipse the one along x.
+    #[arg(long, value_name = "R", value_parser = positive)]
+    pub radius_mm: f64,
+    /// Speed of the beam, mm/s.
+    #[arg(long, value_name = "MM_S", value_parser = positive)]
+    pub speed: f64,
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Radius along x over radius along y, 0.05 to 20.
+    #[arg(long, value_name = "RATIO", default_value = "1", value_parser = ratio)]
+    pub ellipse: f64,
+    /// Its centre, mm.
+    #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = pair)]
+    pub centre_mm: [f64; 2],
+    /// Part of the voltage that run-in and run-out keep for the servo's feedback, 0 to 0.9.
+    #[arg(long, value_name = "R", default_value = "0.12", value_parser = reserve)]
+    pub reserve: f64,
+    /// Half of this is what a motor off the nominal one may be off after the run-in, µm.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
+    pub tolerance_um: f64,
+    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.
+    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
+          value_parser = mismatch, allow_hyphen_values = true)]
+    pub mismatch: Mismatch,
+    /// Folder for report.html, mark.png and plan.ftheta.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub struct Pattern {
+    #[command(subcommand)]
+    pub kind: PatternKind,
+}
+
+#[derive(Subcommand)]
+pub enum PatternKind {
+    /// The ILDA test pattern: planned, beside what comes of its points played at a constant rate.
+    Ilda(IldaPattern),
+}
+
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(
+    after_help = "Example: ftheta pattern ilda --machine S10-f160 --out ilda.svg --report ilda"
+)]
+pub struct IldaPattern {
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Side of the pattern, mm; eight optical degrees if not given.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub field: Option<f64>,
+    /// Drawing to write, .svg; the features' nominal places go beside it, .json.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Folder for pattern.html and plan.ftheta.
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Speed at which the pattern is planned, mm/s.
+    #[arg(long, value_name = "MM_S", default_value = "3000", value_parser = positive)]
+    pub speed: f64,
+    /// Rate at which its points are played, 1/s.
+    #[arg(long, value_name = "N", default_value = "30000", value_parser = rate)]
+    pub points_per_s: f64,
+    /// Greatest distance of the planned beam from the pattern, µm.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
+    pub tolerance_um: f64,
+    /// Folder for jump atlases, so that they are built once; the system's cache if not given.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.
+    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
+          value_parser = mismatch, allow_hyphen_values = true)]
+    pub mismatch: Mismatch,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 pub enum PlannerName {
     /// Marks at constant dose, between them the fastest motion that motors and resonance allow.
@@ -277,6 +366,19 @@ fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| {
         if value > 0.0 { Ok(value) } else { Err(format!("{value} is not greater than 0")) }
     })
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    within(number(text)?, 0.05..=20.0)
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    within(number(text)?, 100.0..=1e6)
+}
+
+fn pair(text: &str) -> Result<[f64; 2], String> {
+    let (x, y) = text.split_once(',').ok_or_else(|| format!("\"{text}\" is not two numbers"))?;
+    Ok([number(x)?, number(y)?])
 }
 
 fn noise(text: &str) -> Result<f64, String> {

@@ -1,10 +1,12 @@
 //! The commands: each reads its arguments, calls the library, prints.
 
+pub mod circle;
 pub mod convert;
 pub mod jump;
 pub mod machine;
 pub mod mark;
 pub mod mechanism;
+pub mod pattern;
 pub mod verify;
 
 use crate::arguments::Arguments;

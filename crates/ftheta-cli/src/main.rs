@@ -20,7 +20,9 @@ fn main() -> ExitCode {
         Command::Mark(mark) => command::mark::run(&mark, json),
         Command::Verify(verify) => command::verify::run(&verify, json),
         Command::Jump(jump) => command::jump::run(&jump, json),
+        Command::Circle(circle) => command::circle::run(&circle, json),
         Command::Convert(convert) => command::convert::run(&convert, json),
+        Command::Pattern(pattern) => command::pattern::run(&pattern, json),
         Command::Machine(machine) => command::machine::run(&machine, json),
         Command::Completions { shell } => {
             command::completions(shell);

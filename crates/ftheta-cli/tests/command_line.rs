@@ -350,3 +350,63 @@ fn mechanisms_become_machines() {
     let fault = bench.fault(&["machine", "mechanism", "bad.toml"]);
     assert_eq!((&fault["value"], &fault["limit"]), (&"0".into(), &"0.01 to 1000".into()));
 }
+
+#[test]
+fn a_circle_is_true_and_uniform() {
+    let bench = Bench::new();
+    let (code, value) = bench.json(&[
+        "circle",
+        "--radius-mm",
+        "0.5",
+        "--speed",
+        "2000",
+        "--machine",
+        "S10-f160",
+        "--out",
+        "round",
+    ]);
+    assert_eq!(code, 0, "{value}");
+    assert!(value["radius_error_um"]["max"].as_f64().unwrap() <= 0.5, "{value}");
+    assert!(value["speed_ratio"]["min"].as_f64().unwrap() >= 0.999, "{value}");
+    assert!(value["speed_ratio"]["max"].as_f64().unwrap() <= 1.001, "{value}");
+    assert!(value["run_in_s"].as_f64().unwrap() < 1e-3, "{value}");
+    for name in ["report.html", "mark.png", "plan.ftheta"] {
+        assert!(bench.path("round").join(name).exists(), "{name}");
+    }
+    let (code, verified) = bench.json(&["verify", "round/plan.ftheta"]);
+    assert_eq!(code, 0, "{verified}");
+    let fault = bench.fault(&["circle", "--radius-mm", "0.5", "--speed", "50000"]);
+    assert!(fault["where"].as_str().unwrap().starts_with("circle"), "{fault}");
+}
+
+#[test]
+fn a_pattern_is_written_and_compared() {
+    let bench = Bench::new();
+    let (code, value) = bench.json(&[
+        "pattern",
+        "ilda",
+        "--machine",
+        "S10-f160",
+        "--field",
+        "5",
+        "--speed",
+        "1000",
+        "--out",
+        "ilda.svg",
+        "--report",
+        "ilda",
+        "--cache",
+        "cache",
+    ]);
+    assert_eq!(code, 0, "{value}");
+    assert!(value["planned"]["error_um"]["max"].as_f64().unwrap() <= 10.0, "{value}");
+    assert_eq!(value["played"].as_array().unwrap().len(), 2, "{value}");
+    let features: Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("ilda.json")).unwrap()).unwrap();
+    assert_eq!(features["kind"], "ilda");
+    assert_eq!(features["features"].as_array().unwrap().len(), 15);
+    assert!(bench.path("ilda").join("pattern.html").exists());
+    // The drawing is one like any other.
+    let (code, converted) = bench.json(&["convert", "ilda.svg", "ilda.csv"]);
+    assert_eq!(code, 0, "{converted}");
+}

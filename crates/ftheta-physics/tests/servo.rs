@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
 use ftheta_model::machine::{Losses, Scanner, Sensor, Servo};
-use ftheta_physics::axis_loop::{AxisLoop, spectral_radius};
+use ftheta_physics::axis_loop::{self, AxisLoop, spectral_radius};
 use ftheta_physics::galvo::{Galvo, State};
 use ftheta_physics::servo::{Gains, ServoError};
 use nalgebra::{Matrix2, Vector2};
@@ -125,6 +125,11 @@ fn response_at_circle_frequencies_is_the_regulators() {
         let found = response(&scanner, speed_mm_s / (TAU * radius_mm));
         assert!((found.0 - gain).abs() < 2e-6, "gain {}", found.0);
         assert!((found.1 - phase_deg).abs() < 5e-4, "phase {}", found.1);
+        let (galvo, gains) = (Galvo::new(&scanner), Gains::design(&scanner, TICK_S).unwrap());
+        let hz = speed_mm_s / (TAU * radius_mm);
+        let closed = axis_loop::response(&galvo, &gains, TICK_S, hz).unwrap();
+        assert!((closed.norm() - found.0).abs() < 1e-9, "{closed}");
+        assert!((closed.arg().to_degrees() - found.1).abs() < 1e-6, "{closed}");
     }
 }
 

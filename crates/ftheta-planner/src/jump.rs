@@ -20,7 +20,7 @@ pub use atlas::{ATLAS_VERSION, Atlas, AtlasOptions, Jump, Level, N_LEVELS};
 pub(crate) use axis::check as check_axis;
 pub use axis::{Axis, AxisOptions, CurrentBound, Model, Reach};
 pub use error::JumpError;
-pub use exact::fewest_ticks_between;
+pub use exact::{Passage, fewest_ticks_between, fewest_ticks_of_passages};
 pub use fan::Ask;
 pub(crate) use limit::guess_s;
 pub use limit::{fewest_ticks, limit_s, settle_limit_s};

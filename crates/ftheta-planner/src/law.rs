@@ -17,7 +17,7 @@ mod tune;
 pub use error::LawError;
 
 use crate::jump::{
-    Axis, AxisOptions, CurrentBound, Model, Route, fewest_ticks, fewest_ticks_between,
+    Axis, AxisOptions, CurrentBound, JumpError, Model, Route, fewest_ticks, fewest_ticks_between,
 };
 use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::Galvo;
@@ -34,7 +34,8 @@ const N_TUNINGS: usize = 8;
 pub enum Law {
     /// Fewest ticks on the nominal axis, ending exactly at rest.
     Optimal,
-    /// Fewest ticks that also stand the machine's uncertainty of mode and damping.
+    /// Fewest ticks that also stand the machine's uncertainty of mode and damping; from rest to
+    /// rest with all of the tolerance used, so that the place of rest may be off the target too.
     Robust,
     /// Equal segments of constant voltage, the action time found by bisection.
     ///
@@ -127,7 +128,9 @@ pub fn plan(scanner: &Scanner, law: Law, request: &Request) -> Result<Motion, La
     match law {
         Law::Optimal => ticks(scanner, Model::Flexible, request),
         Law::Robust => {
-            ticks(scanner, Model::Robust { epsilon_rad: request.tolerance_rad }, request)
+            let epsilon_rad = request.tolerance_rad;
+            let robust = ticks(scanner, Model::Robust { epsilon_rad }, request)?;
+            closer(scanner, Model::Closest { epsilon_rad }, request, robust)
         }
         Law::Bisection { n_segments, current_bound } => {
             bisection::bisect(scanner, n_segments, current_bound, request)
@@ -139,12 +142,7 @@ pub fn plan(scanner: &Scanner, law: Law, request: &Request) -> Result<Motion, La
 /// The fewest ticks; between moving ends on a way that lies as far on one side of the centre as on
 /// the other.
 fn ticks(scanner: &Scanner, model: Model, request: &Request) -> Result<Motion, LawError> {
-    let options = AxisOptions {
-        model,
-        tick_s: request.period_s,
-        voltage_reserve: request.reserve,
-        current_bound: CurrentBound::Always,
-    };
+    let options = options(model, request);
     if !request.is_at_rest() {
         let route = Route {
             from_rad: -0.5 * request.step_rad,
@@ -161,14 +159,55 @@ fn ticks(scanner: &Scanner, model: Model, request: &Request) -> Result<Motion, L
         return Ok(Motion { plan_s, hold_s: request.period_s, voltages_v });
     }
     let n_ticks = fewest_ticks(scanner, options, request.step_rad)?;
-    let longest = Axis::new(scanner, options)?.longest(n_ticks)?;
-    let mut voltages_v = Vec::new();
-    if let Some(longest) = longest {
-        let scale = request.step_rad / longest.step_rad;
-        voltages_v = longest.voltages_v.iter().map(|voltage| voltage * scale).collect();
-    }
+    let voltages_v = step(scanner, options, request.step_rad, n_ticks)?.unwrap_or_default();
     let plan_s = n_ticks as f64 * request.period_s;
     Ok(Motion { plan_s, hold_s: request.period_s, voltages_v })
+}
+
+/// The voltages of a step in this many ticks, scaled from the longest; `None` if that is shorter.
+fn step(
+    scanner: &Scanner,
+    options: AxisOptions,
+    step_rad: f64,
+    n_ticks: usize,
+) -> Result<Option<Vec<f64>>, JumpError> {
+    let longest = Axis::new(scanner, options)?.longest(n_ticks)?;
+    let longest = longest.filter(|longest| longest.step_rad >= step_rad.abs());
+    Ok(longest.map(|longest| {
+        let scale = step_rad / longest.step_rad;
+        longest.voltages_v.iter().map(|voltage| voltage * scale).collect()
+    }))
+}
+
+fn options(model: Model, request: &Request) -> AxisOptions {
+    AxisOptions {
+        model,
+        tick_s: request.period_s,
+        voltage_reserve: request.reserve,
+        current_bound: CurrentBound::Always,
+    }
+}
+
+/// The same step in fewer ticks as long as the model finds voltages, tick by tick.
+fn closer(
+    scanner: &Scanner,
+    model: Model,
+    request: &Request,
+    mut motion: Motion,
+) -> Result<Motion, LawError> {
+    while request.is_at_rest() && motion.voltages_v.len() > 1 {
+        let n_ticks = motion.voltages_v.len() - 1;
+        match step(scanner, options(model, request), request.step_rad, n_ticks) {
+            Ok(Some(voltages_v)) => {
+                let plan_s = n_ticks as f64 * request.period_s;
+                motion = Motion { plan_s, voltages_v, ..motion };
+            }
+            // What is at hand is good.
+            Ok(None) | Err(JumpError::Unsolved { .. }) => break,
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(motion)
 }
 
 /// A law that is a profile of acceleration.

@@ -3,6 +3,7 @@
 //! Deterministic: the same toolpath and machine give the same plan, bit for bit.
 
 mod builder;
+pub mod circle;
 pub mod classic;
 mod convex;
 pub mod corner;

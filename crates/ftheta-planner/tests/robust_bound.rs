@@ -8,6 +8,7 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT};
 use ftheta_model::machine::Scanner;
 use ftheta_planner::jump::{Axis, AxisOptions, CurrentBound, Model};
+use ftheta_planner::law::{Law, Request, plan};
 use plant::{Flow, Motion, TICK_S, scanner};
 
 /// Allowed distance of the mirror from its target, rad: 0.002°.
@@ -38,9 +39,7 @@ impl Conditions {
             let row = (0..n_ticks).map(|at| if at <= tick { pulse[tick - at] } else { 0.0 });
             conditions.either_sign(&row.collect::<Vec<_>>(), 0.0, scanner.current_max_a);
         }
-        for mode in
-            (0..N_MODES).map(|index| 0.97 + 0.06 * f64::from(index) / f64::from(N_MODES - 1))
-        {
+        for mode in (0..N_MODES).map(|index| 0.97 + 0.005 * f64::from(index)) {
             for damping_ratio in DAMPING_RATIOS {
                 let torsional_mode_hz = scanner.torsional_mode_hz * mode;
                 let plant = Scanner { torsional_mode_hz, damping_ratio, ..scanner.clone() };
@@ -144,5 +143,40 @@ fn the_planner_keeps_the_bound_and_is_near_it() {
         let reach = Axis::new(&scanner("S10"), options).unwrap().longest(n_ticks).unwrap().unwrap();
         let ratio = reach.step_rad.to_degrees() / bound_deg("S10", n_ticks);
         assert!((0.95..=1.0).contains(&ratio), "{n_ticks} ticks: {ratio}");
+    }
+}
+
+/// Ticks of the law's single steps, and how far any of a hundred plants is off the target from the
+/// end on: 147 is the reference, 162 and 211 are certified above to be the fewest.
+#[test]
+fn longest_steps_need_next_to_no_more_ticks_and_settle_at_once() {
+    for (set, step_deg, n_ticks) in [("S14", 20.0_f64, 147), ("S25", 10.0, 162), ("S25", 20.0, 213)]
+    {
+        let scanner = scanner(set);
+        let step_rad = step_deg.to_radians();
+        let request = Request {
+            step_rad,
+            from_rad_s: 0.0,
+            to_rad_s: 0.0,
+            tolerance_rad: EPSILON_RAD,
+            reserve: 0.0,
+            period_s: TICK_S,
+        };
+        let voltages_v = plan(&scanner, Law::Robust, &request).unwrap().voltages_v;
+        assert!(voltages_v.len() <= n_ticks, "{set} {step_deg}°: {}", voltages_v.len());
+        for mode in (0..25).map(|index| 0.97 + 0.0025 * f64::from(index)) {
+            for damping_ratio in [0.0025, 0.005, 0.01, 0.02] {
+                let torsional_mode_hz = scanner.torsional_mode_hz * mode;
+                let plant = Scanner { torsional_mode_hz, damping_ratio, ..scanner.clone() };
+                let flow = Flow::new(&plant, TICK_S);
+                let move_on = |state: Motion, voltage_v: &f64| flow.after(&state, *voltage_v);
+                let mut state = voltages_v.iter().fold([0.0; 5], move_on);
+                for tick in 0..LOOKS {
+                    let off = (state[0] - step_rad).abs() / EPSILON_RAD;
+                    assert!(off <= 1.0, "{set} {step_deg}° {mode} {damping_ratio} {tick}: {off}");
+                    state = flow.after(&state, 0.0);
+                }
+            }
+        }
     }
 }

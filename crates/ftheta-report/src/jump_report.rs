@@ -93,7 +93,7 @@ const COLORS: [&str; 12] = [
 pub fn jump_report_html(input: &JumpReportInput<'_>) -> String {
     let mut out = String::with_capacity(1 << 20);
     let title = format!("Jumps of {}", input.machine.name);
-    header(&mut out, &title, input.settings);
+    header(&mut out, "jumps", &title, input.settings);
     times::chart(&mut out, input);
     table(&mut out, input);
     for step in input.steps {
@@ -107,7 +107,9 @@ pub fn jump_report_html(input: &JumpReportInput<'_>) -> String {
 }
 
 /// Everything up to the first section.
-fn header(out: &mut String, title: &str, settings: &[(String, String)]) {
+///
+/// * `kind`: of page
+pub(crate) fn header(out: &mut String, kind: &str, title: &str, settings: &[(String, String)]) {
     let title = escaped(title);
     put(
         out,
@@ -115,7 +117,7 @@ fn header(out: &mut String, title: &str, settings: &[(String, String)]) {
             "<!doctype html>\n<html lang=en><head><meta charset=utf-8>\
              <meta name=viewport content='width=device-width, initial-scale=1'>\
              <title>{title} – ftheta</title><style>{}</style></head><body>\
-             <header><div class=brand>ftheta · jumps</div><h1>{title}</h1>\
+             <header><div class=brand>ftheta · {kind}</div><h1>{title}</h1>\
              <dl class=facts>",
             include_str!("report.css")
         ),

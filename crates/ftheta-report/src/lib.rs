@@ -1,6 +1,7 @@
 //! What the beam did against what was asked: figures, picture and report.
 
 pub mod jump_report;
+pub mod pattern_report;
 pub mod plate;
 pub mod report;
 pub mod score;

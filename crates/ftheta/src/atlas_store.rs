@@ -134,7 +134,7 @@ fn key(scanner: &Scanner, axis: AxisOptions) -> CacheKey {
     // Only what is held by the servo depends on it and on the torque constant's uncertainty.
     let held = match axis.model {
         Model::Held { .. } => Some((scanner.servo, scanner.kt_uncertainty)),
-        Model::Rigid | Model::Flexible | Model::Robust { .. } => None,
+        Model::Rigid | Model::Flexible | Model::Robust { .. } | Model::Closest { .. } => None,
     };
     CacheKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}"))
 }

@@ -5,15 +5,18 @@
 
 pub mod against;
 pub mod atlas_store;
+pub mod circle;
 pub mod convert;
 pub mod error;
 pub mod import;
 pub mod jump;
 pub mod jump_results;
+mod lit;
 pub mod machines;
 pub mod mark;
 pub mod mechanism;
 pub mod output;
+pub mod pattern;
 mod planning;
 pub mod results;
 pub mod verify;

@@ -10,7 +10,7 @@ use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, Planner};
 use ftheta_model::recipe::Recipe;
 use ftheta_model::toolpath::Toolpath;
-use ftheta_model::trace::AxisStates;
+use ftheta_model::trace::{AxisStates, Trace};
 use ftheta_model::warning::{Imported, Warning};
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
@@ -229,6 +229,16 @@ pub fn play(
     options: &MarkOptions,
     observer: &mut dyn FnMut(Stage),
 ) -> Result<Played, Error> {
+    play_watched(plan, options, observer, &mut |_| {})
+}
+
+/// The same, with every stretch of the trace shown to `watch`.
+pub(crate) fn play_watched(
+    plan: &Plan,
+    options: &MarkOptions,
+    observer: &mut dyn FnMut(Stage),
+    watch: &mut dyn FnMut(&Trace),
+) -> Result<Played, Error> {
     let n_samples = plan.n_samples();
     let twin_options = TwinOptions {
         mismatch: options.mismatch,
@@ -238,9 +248,10 @@ pub fn play(
     };
     let mut twin = twin(&plan.machine, options, &twin_options)?;
     let mut states = Vec::new();
-    let score = score(plan, Renderer::new(plan), &mut twin, &mut |first_index, found| {
+    let score = score(plan, Renderer::new(plan), &mut twin, &mut |first_index, trace| {
         observer(Stage::Play(first_index as f64 / n_samples as f64));
-        states.extend(found);
+        watch(&trace);
+        states.extend(trace.states);
     })?;
     observer(Stage::Finish);
     Ok(Played { score, dose: twin.into_dose(), states })
@@ -262,20 +273,20 @@ pub(crate) fn twin(
 
 /// Plays a plan from a renderer at its start on a twin at rest.
 ///
-/// * `see` is given the states of stretch after stretch, and the index of the sample after them
+/// * `see` is given stretch after stretch, and the index of the sample after it
 pub(crate) fn score(
     plan: &Plan,
     mut renderer: Renderer<'_>,
     twin: &mut Twin,
-    see: &mut dyn FnMut(u64, Vec<AxisStates>),
+    see: &mut dyn FnMut(u64, Trace),
 ) -> Result<Score, Error> {
     let mut scorer = Scorer::new(plan);
     let mut block = Block::default();
     let mut n_blocks = 0;
     let mut look = |twin: &mut Twin, index: u64| {
-        let mut trace = twin.take_trace();
+        let trace = twin.take_trace();
         scorer.add(&trace);
-        see(index, std::mem::take(&mut trace.states));
+        see(index, trace);
     };
     while renderer.next_block(&mut block) {
         if n_blocks % N_BLOCKS_PER_STRETCH == 0 {

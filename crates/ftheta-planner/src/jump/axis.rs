@@ -14,21 +14,33 @@ const CHECK_S: f64 = 1e-6;
 const BOUNDED: [f64; 3] = [0.2, 0.5, 0.8];
 /// The same for ticks in which the mode or the coil's time constant bends the current more.
 const BOUNDED_OFTEN: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/// Frequencies of the torsional mode that a robust jump stands.
-const N_FREQUENCIES: usize = 7;
 /// Damping ratios that a robust jump stands, and what is between: nobody measures them, so both
 /// ends of what is seen; the machine's own if it lies beyond.
 const DAMPING_RATIOS: [f64; 2] = [0.0025, 0.02];
-/// When one looks at what is left of the motion, in units of the time that a left current needs to
-/// drive the rigid part farthest away.
-const LOOKS: [f64; N_LOOKS] = [0.0, 0.5, 1.0];
-/// Number of looks.
-pub(super) const N_LOOKS: usize = 3;
 /// Parts of a tick after which the mirror's angle is looked at, besides its end. Between two looks
 /// it bends by a few millionths of the angle limit, between two ticks by sixteen times that.
 const TURNS: [f64; 3] = [0.25, 0.5, 0.75];
-/// Part of the allowed end error that the program may use.
-const ERROR_SHARE: f64 = 0.95;
+/// How closely uncertain plants are looked at.
+#[derive(Clone, Copy, Debug)]
+struct Watch {
+    /// Frequencies of the torsional mode over the uncertainty.
+    n_frequencies: usize,
+    /// When one looks at what is left of the motion, in units of the time that a left current needs
+    /// to drive the rigid part farthest away.
+    looks: &'static [f64],
+    /// Part of the allowed end error that the program may use; the rest is for what is between
+    /// the frequencies and the looks.
+    error_share: f64,
+}
+
+/// Enough for an atlas, whose sequences are solved by the hundred.
+const ROBUST: Watch = Watch { n_frequencies: 7, looks: &[0.0, 0.5, 1.0], error_share: 0.95 };
+/// What remains to be had costs four times the work. The last look is at rest.
+const CLOSEST: Watch = Watch {
+    n_frequencies: 13,
+    looks: &[0.0, 0.25, 0.5, 0.75, 0.9, 1.05, 1.3, 3.0, 30.0],
+    error_share: 0.982,
+};
 
 /// What is known of the torsional mode, and what the end of the jump must be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +53,12 @@ pub enum Model {
     /// whose damping ratio is from 0.0025 to 0.02 ends within this many rad of the target, its
     /// vibration included, and stays there; nominally no current is left.
     Robust {
+        /// Allowed end error, rad mechanical.
+        epsilon_rad: f64,
+    },
+    /// As robust, with all of the tolerance used: plants and times are closer, and the place of
+    /// rest may be off the target too. Single steps, not atlases, whose jumps end at their target.
+    Closest {
         /// Allowed end error, rad mechanical.
         epsilon_rad: f64,
     },
@@ -90,11 +108,11 @@ pub struct Reach {
 pub(super) type Weights = (State, f64);
 
 /// One plant whose distance from rest at the end is bounded.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Plant {
     pub(super) step: Step,
     /// What is bounded at each look, as weights of the state at the end of the jump, rad.
-    pub(super) looks: [Look; N_LOOKS],
+    pub(super) looks: Vec<Look>,
 }
 
 /// Weights of the state at the end of a jump in what is left at some time: how far the rigid part
@@ -137,6 +155,8 @@ pub struct Axis {
     /// Plants whose distance from rest is bounded, and the bound, rad.
     pub(super) plants: Vec<Plant>,
     pub(super) residual_max_rad: f64,
+    /// Whether the place of rest may be off the target, within that bound.
+    pub(super) rests_anywhere: bool,
     /// Plants that the servo has to hold within the same bound.
     pub(super) held: Vec<Held>,
     /// Current where it is checked inside the tick.
@@ -159,19 +179,22 @@ impl Axis {
         {
             Model::Rigid => (rigid(&nominal), &[0, 1, 4], &[1, 4]),
             Model::Flexible | Model::Held { .. } => (nominal, &[0, 1, 2, 3, 4], &[1, 2, 3, 4]),
-            Model::Robust { .. } => (nominal, &[0, 1, 2, 3, 4], &[4]),
+            Model::Robust { .. } | Model::Closest { .. } => (nominal, &[0, 1, 2, 3, 4], &[4]),
         };
-        let mut plants = Vec::new();
-        let mut residual_max_rad = f64::INFINITY;
-        if let Model::Robust { epsilon_rad } = options.model {
-            plants = uncertain(&nominal, scanner.f1_uncertainty, options.tick_s);
-            residual_max_rad = ERROR_SHARE * epsilon_rad;
-        }
+        let watched = |watch: Watch, epsilon_rad: f64| {
+            let plants = uncertain(&nominal, scanner.f1_uncertainty, options.tick_s, watch);
+            (plants, watch.error_share * epsilon_rad)
+        };
         let mut held = Vec::new();
-        if let Model::Held { epsilon_rad } = options.model {
-            held = Held::plants(scanner, options.tick_s)?;
-            residual_max_rad = ERROR_SHARE * epsilon_rad;
-        }
+        let (plants, residual_max_rad) = match options.model {
+            Model::Rigid | Model::Flexible => (Vec::new(), f64::INFINITY),
+            Model::Robust { epsilon_rad } => watched(ROBUST, epsilon_rad),
+            Model::Closest { epsilon_rad } => watched(CLOSEST, epsilon_rad),
+            Model::Held { epsilon_rad } => {
+                held = Held::plants(scanner, options.tick_s)?;
+                (Vec::new(), ROBUST.error_share * epsilon_rad)
+            }
+        };
         let (inside, bounded) = match options.current_bound {
             CurrentBound::Always => currents(&galvo, options.tick_s),
             CurrentBound::AtTicks => (Vec::new(), Vec::new()),
@@ -192,6 +215,7 @@ impl Axis {
             galvo,
             plants,
             residual_max_rad,
+            rests_anywhere: matches!(options.model, Model::Closest { .. }),
             held,
             inside,
             bounded,
@@ -248,7 +272,16 @@ impl Axis {
     ) -> Result<Option<Vec<f64>>, JumpError> {
         let start = State::new(0.0, ask.from_rad_s, 0.0, 0.0, 0.0);
         let end = State::new(ask.distance_rad, ask.to_rad_s, 0.0, 0.0, 0.0);
-        let ends = Ends { start, end, place: true };
+        self.pass(Ends { start, end, place: true }, way, n_ticks)
+    }
+
+    /// The same between any states.
+    pub(super) fn pass(
+        &self,
+        ends: Ends,
+        way: Way,
+        n_ticks: usize,
+    ) -> Result<Option<Vec<f64>>, JumpError> {
         let request = Request { n_ticks, ends, goal: Goal::Farthest, way };
         let found = self.best(&request)?.filter(|(factor, _)| *factor >= 1.0);
         Ok(found.map(|(factor, mut voltages_v)| {
@@ -346,8 +379,8 @@ fn creep_row(galvo: &Galvo) -> State {
 ///
 /// Without voltage all of them creep to the same place, and that is where the step leads. What the
 /// rigid part is short of it, and the vibration, both only decay once the current is gone.
-fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
-    let middle = (N_FREQUENCIES / 2) as f64;
+fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64, watch: Watch) -> Vec<Plant> {
+    let middle = (watch.n_frequencies / 2) as f64;
     let mut creep = creep_row(nominal);
     creep[0] = 0.0;
     let share = nominal.rotor_inertia / nominal.inertia();
@@ -356,17 +389,17 @@ fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
         let plant = Galvo { omega, damping_ratio, ..*nominal };
         let (coil, motor) = (nominal.resistance / nominal.inductance, creep[1].recip());
         let farthest_s = (coil / motor).ln() / (coil - motor);
-        let looks = LOOKS.map(|look| {
+        let looks = watch.looks.iter().map(|look| {
             let later = plant.step(look * farthest_s).a.transpose();
             let q = State::new(0.0, 0.0, share, 0.0, 0.0);
             let speed = State::new(0.0, 0.0, 0.0, share / omega, 0.0);
             [creep, q, speed].map(|weights| later * weights)
         });
-        Plant { step: plant.step(tick_s), looks }
+        Plant { step: plant.step(tick_s), looks: looks.collect() }
     };
     let [low, high] = DAMPING_RATIOS;
     let ratios = [low.min(nominal.damping_ratio), high.max(nominal.damping_ratio)];
-    (0..N_FREQUENCIES)
+    (0..watch.n_frequencies)
         .flat_map(|index| ratios.map(|damping_ratio| plant(index, damping_ratio)))
         .collect()
 }
@@ -375,7 +408,9 @@ fn uncertain(nominal: &Galvo, uncertainty: f64, tick_s: f64) -> Vec<Plant> {
 pub(crate) fn check(scanner: &Scanner, options: AxisOptions) -> Result<(), JumpError> {
     let tiny = f64::MIN_POSITIVE;
     let epsilon_rad = match options.model {
-        Model::Robust { epsilon_rad } | Model::Held { epsilon_rad } => epsilon_rad,
+        Model::Robust { epsilon_rad }
+        | Model::Closest { epsilon_rad }
+        | Model::Held { epsilon_rad } => epsilon_rad,
         Model::Rigid | Model::Flexible => 1.0,
     };
     let ranges = [

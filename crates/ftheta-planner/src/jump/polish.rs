@@ -55,7 +55,8 @@ pub(super) fn polish(
     let sizes = rows
         .iter()
         .map(|row| row.weights.dot(&ends.end).abs() + row.weights.dot(&ends.start).abs());
-    let size = factor * sizes.fold(0.0, f64::max);
+    let angle = if ends.place { ends.end[0].abs() } else { 0.0 };
+    let size = factor * sizes.fold(angle, f64::max);
     let met = defect(axis, ends, factor, &voltages_v, &rows).amax() <= REST * size;
     met.then_some((factor, voltages_v))
 }
@@ -79,7 +80,7 @@ fn end_rows(axis: &Axis, ends: &Ends) -> Vec<EndRow> {
         EndRow { weights, creep: false }
     };
     let mut rows: Vec<EndRow> = axis.rest.iter().map(|&state| row(state)).collect();
-    if ends.place {
+    if ends.place && !axis.rests_anywhere {
         rows.push(match axis.creeps() {
             true => EndRow { weights: axis.creep_row(), creep: true },
             false => row(0),
@@ -98,11 +99,15 @@ fn defect(
 ) -> DVector<f64> {
     let (end, _) = run(axis, ends, factor, voltages_v);
     let missed = end - ends.end * factor;
-    let creep_rad =
-        axis.creep_rad(voltages_v) - axis.creep_row().dot(&(ends.end - ends.start)) * factor;
+    let place_rad = place_rad(axis, ends, factor, voltages_v);
     let values =
-        rows.iter().map(|row| if row.creep { creep_rad } else { row.weights.dot(&missed) });
+        rows.iter().map(|row| if row.creep { place_rad } else { row.weights.dot(&missed) });
     DVector::from_iterator(rows.len(), values)
+}
+
+/// How far the place of rest is off the target, rad.
+fn place_rad(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> f64 {
+    axis.creep_rad(voltages_v) - axis.creep_row().dot(&(ends.end - ends.start)) * factor
 }
 
 /// How each voltage changes the rows, rad/V.
@@ -132,6 +137,8 @@ fn run(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> (State, f64
 
 /// Greatest distance of the uncertain plants from what the end must be, rad.
 fn residual_rad(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> f64 {
+    let place_rad =
+        if axis.rests_anywhere { place_rad(axis, ends, factor, voltages_v) } else { 0.0 };
     let residual = |plant: &Plant| {
         let Step { a, b } = plant.step;
         let start = ends.start * factor;
@@ -139,7 +146,7 @@ fn residual_rad(axis: &Axis, ends: &Ends, factor: f64, voltages_v: &[f64]) -> f6
         let missed = end - ends.end * factor;
         let at_look = |look: &Look| {
             let [creep, q, speed] = look.map(|weights| weights.dot(&missed));
-            creep.abs() + q.hypot(speed)
+            (place_rad - creep).abs() + q.hypot(speed)
         };
         plant.looks.iter().map(at_look).fold(0.0, f64::max)
     };

@@ -4,7 +4,7 @@
 //! with the states as variables every row couples neighbours only.
 
 use super::JumpError;
-use super::axis::{Axis, N_LOOKS};
+use super::axis::Axis;
 use super::held::N_DEVIATIONS;
 use crate::convex::{self, Rows};
 use clarabel::solver::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
@@ -122,7 +122,10 @@ struct Layout {
     n_ticks: usize,
     n_states: usize,
     n_plants: usize,
+    n_looks: usize,
     n_held: usize,
+    /// Whether the place of rest off its target is a variable, the last.
+    rests_anywhere: bool,
 }
 
 impl Layout {
@@ -141,7 +144,7 @@ impl Layout {
 
     /// Column of a plant's deviation in this of the [`DEVIATING`] states.
     fn deviation(&self, plant: usize, position: usize) -> usize {
-        self.factor() + 1 + (DEVIATING.len() + N_LOOKS) * plant + position
+        self.factor() + 1 + (DEVIATING.len() + self.n_looks) * plant + position
     }
 
     /// Column of the size of what a plant has to creep at a look.
@@ -154,8 +157,13 @@ impl Layout {
         self.deviation(self.n_plants, 0) + N_DEVIATIONS * plant + index
     }
 
-    fn n_columns(&self) -> usize {
+    /// Column of how far the place of rest is off the target, in units of the bound.
+    fn place(&self) -> usize {
         self.held(self.n_held, 0)
+    }
+
+    fn n_columns(&self) -> usize {
+        self.place() + usize::from(self.rests_anywhere)
     }
 }
 
@@ -178,7 +186,9 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
         n_ticks,
         n_states: axis.active.len(),
         n_plants: axis.plants.len(),
+        n_looks: axis.plants.first().map_or(0, |plant| plant.looks.len()),
         n_held: axis.held.len(),
+        rests_anywhere: axis.rests_anywhere,
     };
     let units = Units::new(axis, request);
     let mut program = Program { axis, request, layout, units, rows: Rows::default() };
@@ -194,7 +204,7 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
     let n_bounds = program.rows.len() - n_equal;
     program.residuals();
     let mut cones = vec![ZeroConeT(n_equal), NonnegativeConeT(n_bounds)];
-    cones.resize(2 + axis.plants.len() * N_LOOKS, SecondOrderConeT(3));
+    cones.resize(2 + program.plants_and_looks().count(), SecondOrderConeT(3));
     let Program { layout, units, rows, .. } = program;
     let mut cost = vec![0.0; layout.n_columns()];
     let squared = match request.goal {
@@ -256,11 +266,12 @@ impl Program<'_> {
             }
         }
         if place && axis.creeps() {
-            let unit = units.state[0];
+            let unit = if axis.rests_anywhere { axis.residual_max_rad } else { units.state[0] };
             let gain = axis.creep_rad(&[units.voltage]) / unit;
             let target = axis.creep_row().dot(&(end - start)) * units.factor / unit;
+            let off = axis.rests_anywhere.then_some((layout.place(), -1.0));
             let voltages = (0..layout.n_ticks).map(|tick| (layout.voltage(tick), gain));
-            self.rows.add(voltages.chain([(layout.factor(), -target)]), 0.0);
+            self.rows.add(voltages.chain([(layout.factor(), -target)]).chain(off), 0.0);
         }
         if let Goal::Coolest(factor) = self.request.goal {
             self.rows.add([(layout.factor(), 1.0)], factor / units.factor);
@@ -333,7 +344,12 @@ impl Program<'_> {
     /// sign.
     fn creep_sizes(&mut self) {
         for (plant, look) in self.plants_and_looks() {
-            let creep = self.missed(plant, &self.axis.plants[plant].looks[look][0]);
+            let mut creep = self.missed(plant, &self.axis.plants[plant].looks[look][0]);
+            if self.axis.rests_anywhere {
+                // What is left to creep is short of the place of rest.
+                creep.iter_mut().for_each(|(_, weight)| *weight = -*weight);
+                creep.push((self.layout.place(), 1.0));
+            }
             let size = (self.layout.creep_size(plant, look), -1.0);
             for sign in [1.0, -1.0] {
                 let creep = creep.iter().map(|&(column, weight)| (column, sign * weight));
@@ -355,8 +371,8 @@ impl Program<'_> {
     }
 
     fn plants_and_looks(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let n_plants = self.layout.n_plants;
-        (0..n_plants).flat_map(|plant| (0..N_LOOKS).map(move |look| (plant, look)))
+        let (n_plants, n_looks) = (self.layout.n_plants, self.layout.n_looks);
+        (0..n_plants).flat_map(move |plant| (0..n_looks).map(move |look| (plant, look)))
     }
 
     /// By how much a plant misses its end, weighed, in units of the bound.

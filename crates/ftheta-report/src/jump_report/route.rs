@@ -25,7 +25,7 @@ pub struct RouteReportInput<'a> {
 /// The page as one HTML document without scripts or references to anything outside it.
 pub fn route_report_html(input: &RouteReportInput<'_>) -> String {
     let mut out = String::with_capacity(1 << 18);
-    header(&mut out, input.title, input.settings);
+    header(&mut out, "jumps", input.title, input.settings);
     out.push_str("<section><h2>Both axes over time</h2><div class=key>");
     for (name, color) in ["x", "y"].iter().zip(COLORS) {
         put(&mut out, format_args!("<span><i style='color:{color}'></i>{name}</span>"));
