@@ -259,6 +259,14 @@ impl Atlas {
         &self.levels[0].sequences_v
     }
 
+    /// Step (rad) and voltages of exactly so many ticks, if a program of its own gave them.
+    pub(super) fn solved(&self, n_ticks: usize) -> Option<(f64, &[f64])> {
+        let Level { steps_rad, sequences_v } = &self.levels[0];
+        let before = n_ticks.checked_sub(1).filter(|_| n_ticks <= N_SEGMENTS)?;
+        let step_rad = *steps_rad.get(n_ticks)?;
+        (step_rad > steps_rad[before]).then(|| (step_rad, &sequences_v[n_ticks][..]))
+    }
+
     /// The scanner that the atlas is for.
     pub fn scanner(&self) -> &Scanner {
         &self.scanner
