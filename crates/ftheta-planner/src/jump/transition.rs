@@ -28,7 +28,7 @@ const N_TICKS_STRAIGHT: usize = 150;
 /// Periods of the mode by which a stop or start without room to spare is longer than others.
 const N_SWINGS: f64 = 2.0;
 /// A displacement may exceed the longest step of its ticks by this part, when the ends move.
-const SLACK: f64 = 1.02;
+const SLACK: f64 = 1.1;
 /// Rounding that an angle, speed or current may carry.
 const ROUNDING: f64 = 1e-9;
 
