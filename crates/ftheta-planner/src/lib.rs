@@ -11,5 +11,6 @@ pub mod jump;
 pub mod law;
 pub mod optimal;
 pub mod render;
+pub mod solved;
 
 pub use error::PlanError;

@@ -173,6 +173,17 @@ impl Atlas {
         Ok(is_short(&self.levels[0]))
     }
 
+    /// The atlas without what lies beyond the first number of ticks that covers a step: the same
+    /// however far it had grown for others.
+    pub fn up_to(mut self, step_rad: f64) -> Self {
+        let n_needed = 1 + self.steps_rad().partition_point(|&reach| reach < step_rad);
+        for level in &mut self.levels {
+            level.steps_rad.truncate(n_needed);
+            level.sequences_v.truncate(n_needed);
+        }
+        self
+    }
+
     /// Makes a level cover so many ticks.
     ///
     /// # Errors

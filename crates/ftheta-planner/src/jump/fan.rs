@@ -12,7 +12,7 @@ use ftheta_physics::galvo::State;
 use std::sync::{LazyLock, OnceLock};
 
 /// Rays in the upper half plane; the lower half is its mirror image.
-pub const N_RAYS: usize = 8;
+const N_RAYS: usize = 8;
 /// Powers of time that displacement and gain grow with at most.
 const GROWTH: [i32; 2] = [5, 4];
 /// The ray of displacement alone, from rest to rest.
@@ -84,22 +84,22 @@ pub(super) struct Fan {
 }
 
 /// The longest transition in one direction of a fan.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ray {
+#[derive(Clone, Debug)]
+struct Ray {
     /// Along the axes the displacement (rad) or half the gain in speed (rad/s), in other
     /// directions a factor on both of them.
-    pub size: f64,
+    size: f64,
     /// Voltage of each tick, V.
-    pub voltages_v: Vec<f64>,
+    voltages_v: Vec<f64>,
 }
 
 impl Fan {
     /// A fan of which at most what the atlas has solved is solved.
     pub(super) fn new(atlas: &Atlas, n_ticks: usize) -> Self {
-        let fan = Self { n_ticks, rays: Default::default() };
+        let mut fan = Self { n_ticks, rays: Default::default() };
         if let Some((size, voltages_v)) = atlas.solved(n_ticks) {
             let voltages_v = voltages_v.to_vec();
-            fan.restore(DISPLACEMENT, Some(Ray { size, voltages_v }));
+            fan.rays[DISPLACEMENT] = Some(Ray { size, voltages_v }).into();
         }
         fan
     }
@@ -108,24 +108,33 @@ impl Fan {
         self.n_ticks
     }
 
-    /// The rays solved so far, `None` where none was found.
-    pub(super) fn solved(&self) -> impl Iterator<Item = (usize, Option<&Ray>)> {
-        self.rays.iter().enumerate().filter_map(|(index, ray)| Some((index, ray.get()?.as_ref())))
+    /// The rays solved so far by their index, but for that of the atlas: size and voltages, `None`
+    /// where there is none.
+    pub(super) fn solved(
+        &self,
+        atlas: &Atlas,
+    ) -> impl Iterator<Item = (usize, Option<Vec<f64>>)> {
+        let n_atlas = usize::from(atlas.solved(self.n_ticks).is_some());
+        let numbers = |ray: &Ray| [&[ray.size], &ray.voltages_v[..]].concat();
+        let solved = move |(index, ray): (usize, &OnceLock<Option<Ray>>)| {
+            Some((index, ray.get()?.as_ref().map(numbers)))
+        };
+        self.rays.iter().enumerate().skip(n_atlas).filter_map(solved)
     }
 
     /// Takes back a ray of [`Self::solved`]; one that does not fit is left out.
-    pub(super) fn restore(&self, index: usize, ray: Option<Ray>) {
-        let fits = |ray: &Ray| {
-            let values = ray.voltages_v.iter().chain([&ray.size]);
-            ray.voltages_v.len() == self.n_ticks
-                && ray.size > 0.0
-                && values.into_iter().all(|value| value.is_finite())
+    pub(super) fn restore(&self, index: usize, numbers: Option<&[f64]>) {
+        let fits = |numbers: &[f64]| {
+            numbers.len() == 1 + self.n_ticks
+                && numbers[0] > 0.0
+                && numbers.iter().all(|number| number.is_finite())
         };
         if let Some(slot) = self.rays.get(index)
-            && ray.as_ref().is_none_or(fits)
+            && numbers.is_none_or(fits)
         {
+            let ray = |numbers: &[f64]| Ray { size: numbers[0], voltages_v: numbers[1..].to_vec() };
             // What is solved already is the same.
-            slot.get_or_init(|| ray);
+            slot.get_or_init(|| numbers.map(ray));
         }
     }
 

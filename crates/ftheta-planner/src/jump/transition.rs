@@ -8,6 +8,7 @@ use super::brake::{Brakes, End, Fit};
 use super::fan::{Ask, Fan, Sum, Term};
 use super::program::Way;
 use super::{Atlas, AtlasOptions, Axis, AxisOptions, JumpError};
+use crate::solved::{RAY, Solved, of_kind};
 use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::{CURRENT, State};
 use std::sync::OnceLock;
@@ -148,6 +149,26 @@ impl Transitions {
     /// The jumps from rest to rest.
     pub fn atlas(&self) -> &Atlas {
         &self.atlas
+    }
+
+    /// The rays of fans that are solved so far, without those that come from the atlas.
+    pub fn solved(&self) -> Solved {
+        let rays = self.fans.iter().flat_map(|fan| {
+            let key = |index: usize| [RAY, fan.n_ticks() as i32, index as i32, 0];
+            fan.solved(&self.atlas).map(move |(index, numbers)| (key(index), numbers))
+        });
+        rays.collect()
+    }
+
+    /// Takes back what [`Self::solved`] gave of the same scanner and options; what does not fit is
+    /// left out.
+    pub fn restore(&self, solved: &Solved) {
+        for ([n_ticks, index, _], numbers) in of_kind(solved, RAY) {
+            let fan = self.fans.binary_search_by_key(&n_ticks, |fan| fan.n_ticks() as i32);
+            if let (Ok(fan), Ok(index)) = (fan, usize::try_from(index)) {
+                self.fans[fan].restore(index, numbers);
+            }
+        }
     }
 
     /// The voltages of a route, or `None` if no motion within the angles makes it.

@@ -245,7 +245,7 @@ impl Marking<'_> {
 
     /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
     /// than the motors stand.
-    fn joints(&mut self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
+    fn joints(&self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
         let mut joints = Vec::with_capacity(turns.len());
         for (turn, pair) in turns.iter().zip(pieces.windows(2)) {
             let voltages = turn.voltages_v([pair[0].part, pair[1].part]);

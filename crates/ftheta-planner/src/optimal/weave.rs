@@ -31,7 +31,7 @@ pub(super) struct Weave<'a> {
     pub(super) machine: &'a Machine,
     pub(super) inverse: &'a Inverse,
     pub(super) smoothing: &'a Smoothing,
-    pub(super) mover: Mover<'a>,
+    pub(super) mover: &'a Mover<'a>,
     pub(super) draft: PlanDraft,
     n_samples: u64,
     heat: Heat,
@@ -63,7 +63,7 @@ impl<'a> Weave<'a> {
         machine: &'a Machine,
         inverse: &'a Inverse,
         smoothing: &'a Smoothing,
-        mover: Mover<'a>,
+        mover: &'a Mover<'a>,
         heat: Heat,
         draft: PlanDraft,
     ) -> Self {
@@ -84,7 +84,7 @@ impl<'a> Weave<'a> {
     /// Time of the mirrors at the end of what is planned, s: computed voltages act a tick after
     /// their sample, angles that are sent are reached after the lag.
     pub(super) fn now_s(&self) -> f64 {
-        match &self.mover {
+        match self.mover {
             Mover::Voltage(_) => (self.n_samples + 1) as f64 * self.period_s,
             Mover::Angle(_, lag_s) => (self.n_samples as f64 - 1.0) * self.period_s + lag_s,
         }
@@ -96,7 +96,7 @@ impl<'a> Weave<'a> {
 
     /// Whether the motors stand these voltages from a state, with the heat they have.
     pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States) -> bool {
-        match &self.mover {
+        match self.mover {
             Mover::Voltage(fly_by) => fly_by.allows(voltages, from, &self.heat),
             Mover::Angle(..) => false,
         }
@@ -104,12 +104,12 @@ impl<'a> Weave<'a> {
 
     /// Voltages that join states exactly, near the ones given.
     pub(super) fn corrected(
-        &mut self,
+        &self,
         voltages: Voltages,
         from: &States,
         to: &States,
     ) -> Option<Voltages> {
-        match &mut self.mover {
+        match self.mover {
             Mover::Voltage(fly_by) => fly_by.corrected(voltages, from, to),
             Mover::Angle(..) => None,
         }
@@ -171,7 +171,7 @@ impl<'a> Weave<'a> {
     }
 
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
-        let motion = match &mut self.mover {
+        let motion = match self.mover {
             Mover::Voltage(fly_by) => fly_by.between(&self.states, &to, &self.heat)?,
             Mover::Angle(glide, _) => glide.between(&self.states, &to),
         };
@@ -188,7 +188,7 @@ impl<'a> Weave<'a> {
         let first = self.draft.drives.len() as u32;
         self.draft.drives.extend(pairs.iter().map(|pair| pair.map(|value| value as f32)));
         self.push(mark_index, pairs.len() as u32, Motion::Drive { first });
-        let Mover::Voltage(fly_by) = &self.mover else {
+        let Mover::Voltage(fly_by) = self.mover else {
             return;
         };
         for pair in pairs {
