@@ -8,11 +8,13 @@ use kurbo::{PathEl, Point};
 
 /// Curves are flattened to this part of the tolerance.
 const FLATTEN_SHARE: f64 = 0.02;
-/// How far ahead a nearest point is looked for, in tolerances.
-const AHEAD: f64 = 8.0;
-/// Greatest difference between what was marked and what was given energy, in spot diameters and
-/// tolerances together.
-const DOSE_SHARE: f64 = 1.0;
+/// How far from the expected arc length a nearest point is looked for, in tolerances.
+const AHEAD: f64 = 3.0;
+/// What being away from the expected arc length counts, against being off the curve.
+const AWAY: f64 = 0.005;
+/// Part of the dose that may be missing for good, besides what a spot and two tolerances make of it
+/// at any place.
+const DOSE_SHARE: f64 = 0.005;
 /// Rounding of times and powers.
 const ROUNDING: f64 = 1e-6;
 
@@ -29,6 +31,9 @@ pub struct Beam<'a> {
     /// Arc length that the beam has come to, and what has been given the pen's energy, mm.
     at_mm: f64,
     given_mm: f64,
+    /// Arc length where the beam should be by the way it has made, mm, and its last place.
+    expected_mm: f64,
+    last: Option<Point>,
     /// Step of power that acts, and until when energy has been counted, ns.
     step: usize,
     counted_ns: f64,
@@ -48,6 +53,8 @@ impl<'a> Beam<'a> {
             leg: 0,
             at_mm: 0.0,
             given_mm: 0.0,
+            expected_mm: 0.0,
+            last: None,
             step: 0,
             counted_ns: 0.0,
         };
@@ -58,6 +65,7 @@ impl<'a> Beam<'a> {
     /// Prepares for the mark that comes next.
     fn enter(&mut self) {
         (self.leg, self.at_mm, self.given_mm, self.step) = (0, 0.0, 0.0, 0);
+        (self.expected_mm, self.last) = (0.0, None);
         let Some(mark) = self.draft.marks.get(self.mark_index).filter(|_| self.strict) else {
             return;
         };
@@ -128,13 +136,16 @@ impl<'a> Beam<'a> {
         self.check_dose(mark)
     }
 
-    /// Distance of a place from the curve, not behind where the beam has been.
+    /// Distance of a place from the curve, near where the beam has been.
+    ///
+    /// Where the curve comes back to a place, the beam is where its way so far says.
     fn nearest_mm(&mut self, place: Point) -> f64 {
-        let reach_mm = self.at_mm + AHEAD * self.draft.tolerance_mm;
-        let before = self.points[self.leg].distance(place);
-        let (mut nearest_mm, mut leg, mut at_mm) = (f64::INFINITY, self.leg, self.at_mm);
+        self.expected_mm += self.last.map_or(0.0, |last| last.distance(place));
+        self.last = Some(place);
+        let reach_mm = AHEAD * self.draft.tolerance_mm;
+        let mut nearest = (f64::INFINITY, f64::INFINITY, self.leg, self.at_mm);
         for index in self.leg..self.points.len() - 1 {
-            if index > self.leg && self.lengths_mm[index] > reach_mm + 2.0 * before {
+            if index > self.leg && self.lengths_mm[index] > self.expected_mm + reach_mm {
                 break;
             }
             let (from, to) = (self.points[index], self.points[index + 1]);
@@ -144,13 +155,21 @@ impl<'a> Beam<'a> {
                 false => 0.0,
             };
             let off_mm = from.lerp(to, share).distance(place);
-            if off_mm < nearest_mm {
-                (nearest_mm, leg) = (off_mm, index);
-                at_mm = self.lengths_mm[index] + share * square.sqrt();
+            let at_mm = self.lengths_mm[index] + share * square.sqrt();
+            if (at_mm - self.expected_mm).abs() > reach_mm && nearest.1 < f64::INFINITY {
+                continue;
+            }
+            let cost = off_mm.hypot(AWAY * (at_mm - self.expected_mm));
+            if cost < nearest.0 {
+                nearest = (cost, off_mm, index, at_mm);
             }
         }
-        (self.leg, self.at_mm) = (leg, at_mm.max(self.at_mm));
-        nearest_mm
+        let (_, off_mm, leg, at_mm) = nearest;
+        self.leg = leg;
+        if at_mm > self.at_mm {
+            (self.at_mm, self.expected_mm) = (at_mm, at_mm);
+        }
+        off_mm
     }
 
     /// Counts energy until a time, as the length that the pen would give it to.
@@ -182,7 +201,7 @@ impl<'a> Beam<'a> {
             return Ok(());
         }
         let spot_mm = self.draft.machine.laser.spot_diameter_mm;
-        let limit = DOSE_SHARE * (spot_mm + 2.0 * self.draft.tolerance_mm);
+        let limit = spot_mm + 2.0 * self.draft.tolerance_mm + DOSE_SHARE * self.at_mm;
         let value = (self.given_mm - self.at_mm).abs();
         if value.is_nan() || value > limit {
             let quantity = "length that has too much or too little energy";

@@ -1,7 +1,7 @@
 //! One mark after the other: its speed, its corners, its light.
 
 use super::path::Path;
-use super::speed::{SpeedLimits, profile, time_at_s};
+use super::speed::{SpeedLimits, averaged_mm, profile, time_at_s};
 use super::turn::{Allowance, Turn, candidates, straight_mm};
 use super::weave::{Laid, Stretch, Weave};
 use super::{Corner, OptimalOptions};
@@ -27,6 +27,8 @@ const ALONG_SHARE: f64 = 0.35;
 const MARK_SHARE: f64 = 0.8;
 /// Corners sharper than this are stopped in, where the path is to be exact, rad.
 const STOP_RAD: f64 = 0.02;
+/// How far a beam's nearest point is from where its speed profile says, in tolerances.
+const NEAR: f64 = 2.0;
 /// Least power, as a part of the pen's, so that light does not end before the mark does.
 const POWER_MIN: f64 = 1e-3;
 
@@ -269,7 +271,10 @@ impl Marking<'_> {
             let first_mm = knot.distance_mm - knot.speed_mm_s * knot.time_s;
             return (0..=n_ticks).map(|tick| first_mm + f64::from(tick) * step_mm).collect();
         }
-        path.nearest_mm(&self.weave.places(&piece.laid))
+        let (smoothing, period_s) = (self.weave.smoothing, self.weave.period_s());
+        let around_mm = averaged_mm(knots, smoothing, n_ticks, period_s);
+        let near_mm = NEAR * self.options.tolerance_mm;
+        path.nearest_mm(&self.weave.places(&piece.laid), &around_mm, near_mm)
     }
 
     fn limits(&self, pen: &Pen) -> SpeedLimits {

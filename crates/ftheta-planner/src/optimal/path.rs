@@ -11,8 +11,6 @@ const SAME_PLACE_MM: f64 = 5e-7;
 const TURN_MAX_RAD: f64 = 0.1;
 /// A curve is halved at most so often.
 const N_HALVINGS_MAX: u32 = 14;
-/// How far ahead a nearest point is looked for, besides three times the beam's way, mm.
-const NEAR_MM: f64 = 0.05;
 /// Error of a leg's arc length, relative to it.
 const LENGTH_ERROR: f64 = 1e-11;
 
@@ -92,37 +90,40 @@ impl Path {
         Self { vertices: self.vertices[first..=last].to_vec(), stations, curved: self.curved }
     }
 
-    /// Arc lengths of the points nearest to places that go along the path.
-    pub(super) fn nearest_mm(&self, places: &[Point]) -> Vec<f64> {
-        let mut leg = 0;
-        let mut at_mm = 0.0_f64;
-        let mut before = places.first().copied().unwrap_or_default();
+    /// Arc lengths of the points nearest to places, each looked for near an arc length, mm.
+    ///
+    /// * `near_mm`: how near, so that a path that comes back to the place is not mistaken
+    pub(super) fn nearest_mm(
+        &self,
+        places: &[Point],
+        around_mm: &[f64],
+        near_mm: f64,
+    ) -> Vec<f64> {
         let n_legs = self.vertices.len() - 1;
-        places
-            .iter()
-            .map(|&place| {
-                // What the beam can have gone, and as much as a corner may be cut.
-                let reach_mm = at_mm + 3.0 * before.distance(place) + NEAR_MM;
-                let mut nearest = (f64::INFINITY, at_mm, leg);
-                for index in leg..n_legs {
-                    if index > leg && self.stations[index].distance_mm > reach_mm {
-                        break;
-                    }
-                    let (off_mm, along_mm) = self.foot(index, place);
-                    if off_mm < nearest.0 {
-                        nearest = (off_mm, along_mm, index);
-                    }
+        let mut first = 0;
+        let nearest = |(place, middle_mm): (&Point, &f64)| {
+            let (low_mm, high_mm) = (middle_mm - near_mm, middle_mm + near_mm);
+            while first + 1 < n_legs && self.stations[first + 1].distance_mm < low_mm {
+                first += 1;
+            }
+            let mut nearest = (f64::INFINITY, *middle_mm);
+            for leg in first..n_legs {
+                if leg > first && self.stations[leg].distance_mm > high_mm {
+                    break;
                 }
-                before = place;
-                (at_mm, leg) = (nearest.1.max(at_mm), nearest.2);
-                at_mm
-            })
-            .collect()
+                let (off_mm, along_mm) = self.foot(leg, *place, (low_mm, high_mm));
+                if off_mm < nearest.0 {
+                    nearest = (off_mm, along_mm);
+                }
+            }
+            nearest.1
+        };
+        places.iter().zip(around_mm).map(nearest).collect()
     }
 
-    /// Distance of a place from a leg, and arc length of the leg's nearest point; before the first
-    /// leg and after the last it goes straight on.
-    fn foot(&self, leg: usize, place: Point) -> (f64, f64) {
+    /// Distance of a place from a leg, and arc length of the leg's nearest point between two; before
+    /// the first leg and after the last it goes straight on.
+    fn foot(&self, leg: usize, place: Point, (low_mm, high_mm): (f64, f64)) -> (f64, f64) {
         let (from, to) = (self.vertices[leg], self.vertices[leg + 1]);
         let start_mm = self.stations[leg].distance_mm;
         let length_mm = self.stations[leg + 1].distance_mm - start_mm;
@@ -130,7 +131,10 @@ impl Path {
         let share = (place - from).dot(chord) / chord.hypot2();
         let low = if leg == 0 { f64::NEG_INFINITY } else { 0.0 };
         let high = if leg + 2 == self.vertices.len() { f64::INFINITY } else { 1.0 };
-        let share = share.clamp(low, high);
+        let share = share
+            .clamp(low, high)
+            .max((low_mm - start_mm) / length_mm)
+            .min((high_mm - start_mm) / length_mm);
         ((from + chord * share).distance(place), start_mm + share * length_mm)
     }
 

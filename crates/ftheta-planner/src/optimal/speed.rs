@@ -5,7 +5,7 @@
 //! mean square of the averaged time. What several vertices within that time miss adds up.
 
 use super::path::{Path, angle};
-use super::smoothing::Smoothing;
+use super::smoothing::{Smoothing, shares};
 use ftheta_model::plan::Knot;
 
 /// Part of what may be missed by which the acceleration alone may miss a reversal.
@@ -248,4 +248,39 @@ pub(super) fn time_at_s(knots: &[Knot], distance_mm: f64) -> f64 {
     let speed = (from.speed_mm_s.powi(2) + 2.0 * acceleration * gap_mm).max(0.0).sqrt();
     // Both roots alike: neither a small acceleration nor a small speed is divided by.
     from.time_s + 2.0 * gap_mm / (from.speed_mm_s + speed)
+}
+
+/// Arc length that a profile has covered at every tick up to the last, averaged as places are, mm.
+pub(super) fn averaged_mm(
+    knots: &[Knot],
+    smoothing: &Smoothing,
+    n_ticks: u32,
+    period_s: f64,
+) -> Vec<f64> {
+    let shares = shares(smoothing.n_ticks);
+    let half = 0.5 * (shares.len() - 1) as f64;
+    let mut cursor = 0;
+    let base: Vec<f64> = (0..n_ticks as usize + shares.len())
+        .map(|index| distance_mm(knots, &mut cursor, (index as f64 - half) * period_s))
+        .collect();
+    let mean = |first: usize| -> f64 {
+        base[first..].iter().zip(&shares).map(|(at_mm, share)| at_mm * share).sum()
+    };
+    (0..=n_ticks as usize).map(mean).collect()
+}
+
+/// Distance that a profile has covered at a time; times may not fall.
+fn distance_mm(knots: &[Knot], cursor: &mut usize, time_s: f64) -> f64 {
+    while knots.get(*cursor + 1).is_some_and(|next| next.time_s <= time_s) {
+        *cursor += 1;
+    }
+    let from = knots[*cursor];
+    let since_s = time_s - from.time_s;
+    let gain = match knots.get(*cursor + 1) {
+        Some(to) if since_s > 0.0 => {
+            (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s) * since_s
+        }
+        _ => 0.0,
+    };
+    from.distance_mm + (from.speed_mm_s + 0.5 * gain) * since_s
 }
