@@ -21,6 +21,7 @@ use crate::jump::Transitions;
 use fly_by::FlyBy;
 use ftheta_model::machine::{Drive, Machine, Servo};
 use ftheta_model::plan::{PlanDraft, Planner};
+use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Toolpath;
 use ftheta_physics::follow::Inverse;
 use ftheta_physics::galvo::Galvo;
@@ -31,6 +32,8 @@ use heat::Heat;
 use kurbo::Point;
 use marking::Marking;
 use smoothing::Smoothing;
+use std::num::NonZero;
+use std::thread;
 use weave::{Mover, Weave};
 
 /// How much of the machine planned motion may use: how much the servo's answer needs besides is
@@ -163,6 +166,29 @@ impl<'a> OptimalPlanner<'a> {
         Ok(Self { machine, corners, options, galvo, inverse, smoothing, lag_s, mover })
     }
 
+    /// Solves what a toolpath needs, on all processors, so that [`Self::draft`] finds it solved.
+    ///
+    /// Nothing comes of marks that cannot be planned; the draft tells of them.
+    pub fn solve(&self, toolpath: &Toolpath) {
+        if toolpath.pens.iter().any(|pen| check_pen(pen, self.machine).is_err()) {
+            return;
+        }
+        let n_threads = thread::available_parallelism().map_or(1, NonZero::get);
+        let n_marks = toolpath.marks.len();
+        let n_each = n_marks.div_ceil(n_threads).max(1);
+        thread::scope(|scope| {
+            for first in (0..n_marks).step_by(n_each) {
+                // With the mark before, for the way from it to the first.
+                let marks = &toolpath.marks[first.saturating_sub(1)..n_marks.min(first + n_each)];
+                let (starts, ends) = (first == 0, first + n_each >= n_marks);
+                scope.spawn(move || {
+                    let mut marking = self.marking(toolpath.pens.clone(), marks.len());
+                    let _ = marking.all(marks.iter().cloned(), [starts, ends]);
+                });
+            }
+        });
+    }
+
     /// The content of a plan, before the audit.
     ///
     /// The beam starts and ends in the field centre.
@@ -170,18 +196,26 @@ impl<'a> OptimalPlanner<'a> {
     /// # Errors
     /// If a pen is out of the machine's range, a mark cannot be reached, or a program fails.
     pub fn draft(&self, toolpath: Toolpath) -> Result<PlanDraft, PlanError> {
-        let Self { machine, corners, lag_s, .. } = *self;
         let Toolpath { pens, marks } = toolpath;
         if marks.is_empty() {
             return Err(PlanError::Empty);
         }
-        pens.iter().try_for_each(|pen| check_pen(pen, machine))?;
+        pens.iter().try_for_each(|pen| check_pen(pen, self.machine))?;
+        let mut marking = self.marking(pens, marks.len());
+        marking.all(marks, [true; 2])?;
+        marking.weave.rest_in_centre(lead_out_ticks(self.machine, self.lag_s));
+        Ok(marking.weave.draft)
+    }
+
+    /// Before the first of so many marks.
+    fn marking(&self, pens: Vec<Pen>, n_marks: usize) -> Marking<'_> {
+        let Self { machine, corners, lag_s, .. } = *self;
         let draft = PlanDraft {
             machine: machine.clone(),
             planner: Planner::Optimal,
             tolerance_mm: self.options.tolerance_mm,
             pens,
-            marks: Vec::with_capacity(marks.len()),
+            marks: Vec::with_capacity(n_marks),
             vertices: Vec::new(),
             stations: Vec::new(),
             knots: Vec::new(),
@@ -192,17 +226,7 @@ impl<'a> OptimalPlanner<'a> {
         let weave =
             Weave::new(machine, &self.inverse, &self.smoothing, &self.mover, heat, draft);
         let run_s = RUN_LAGS.map(|lags| if corners.is_some() { 0.0 } else { lags * lag_s });
-        let mut marking =
-            Marking { weave, options: &self.options, corners, galvo: self.galvo, run_s };
-        marking.weave.rest_in_centre(N_REST_TICKS);
-        for mark in marks {
-            marking.mark(mark)?;
-        }
-        if !marking.weave.fly_home()? {
-            return Err(PlanError::NoRoom { place: "the way back to the centre".into() });
-        }
-        marking.weave.rest_in_centre(lead_out_ticks(machine, lag_s));
-        Ok(marking.weave.draft)
+        Marking { weave, options: &self.options, corners, galvo: self.galvo, run_s }
     }
 }
 

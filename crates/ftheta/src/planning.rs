@@ -90,6 +90,7 @@ impl Planning<'_> {
             let motions = Motions::Known { transitions: &transitions, corners: &corners };
             let planner = OptimalPlanner::new(machine, motions, optimal)?;
             options.atlas_store.restore(&transitions, &corners, warnings);
+            planner.solve(toolpath);
             let draft = planner.draft(toolpath.clone());
             options.atlas_store.save_solved(&transitions, &corners, warnings);
             let draft = draft?;
