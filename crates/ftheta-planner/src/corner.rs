@@ -11,6 +11,7 @@ mod course;
 mod side;
 
 use crate::jump::{AxisOptions, JumpError, check_axis};
+use crate::solved::{CORNER_SIDE, Solved, of_kind};
 use course::Plants;
 use ftheta_model::machine::{Scanner, Servo};
 use ftheta_physics::galvo::Galvo;
@@ -69,13 +70,13 @@ pub struct Corner {
 
 /// Where a side stands in the grid of speeds and bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Cell {
+struct Cell {
     /// Which side.
-    pub end: End,
+    end: End,
     /// Quarter powers of two of the speed in rad/s.
-    pub speed: i32,
+    speed: i32,
     /// Sixteenth powers of two of band over speed in s.
-    pub band: i32,
+    band: i32,
 }
 
 /// A side, once it is solved; `None` if no voltages that stay in the band are found.
@@ -193,17 +194,28 @@ impl Corners {
         Ok(side.map(|side| side.scaled(speed_rad_s)))
     }
 
-    /// What is solved so far, in the order of its cells.
-    pub fn solved(&self) -> Vec<(Cell, Option<Side>)> {
+    /// The sides that are solved so far.
+    pub fn solved(&self) -> Solved {
         let slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let solved = |(cell, slot): (&Cell, &Slot)| Some((*cell, slot.get()?.clone()));
+        let solved = |(cell, slot): (&Cell, &Slot)| {
+            let key = [CORNER_SIDE, cell.end as i32, cell.speed, cell.band];
+            Some((key, slot.get()?.as_ref().map(Side::numbers)))
+        };
         slots.iter().filter_map(solved).collect()
     }
 
-    /// Takes back what [`Self::solved`] gave of the same scanner and options.
-    pub fn restore(&self, solved: impl IntoIterator<Item = (Cell, Option<Side>)>) {
+    /// Takes back what [`Self::solved`] gave of the same scanner and options; what does not fit is
+    /// left out.
+    pub fn restore(&self, solved: &Solved) {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        slots.extend(solved.into_iter().map(|(cell, side)| (cell, Slot::new(side.into()))));
+        for ([end, speed, band], numbers) in of_kind(solved, CORNER_SIDE) {
+            let end = if end == End::Arrive as i32 { End::Arrive } else { End::Depart };
+            let side = numbers.map(Side::from_numbers);
+            if side != Some(None) {
+                let slot = Slot::new(side.flatten().into());
+                slots.entry(Cell { end, speed, band }).or_insert(slot);
+            }
+        }
     }
 
     /// The side of a cell, at the cell's own speed, of the first length that can be.

@@ -12,5 +12,6 @@ pub mod jump;
 pub mod law;
 pub mod optimal;
 pub mod render;
+pub mod solved;
 
 pub use error::PlanError;

@@ -21,6 +21,7 @@ use crate::jump::Transitions;
 use fly_by::FlyBy;
 use ftheta_model::machine::{Drive, Machine, Servo};
 use ftheta_model::plan::{PlanDraft, Planner};
+use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Toolpath;
 use ftheta_physics::follow::Inverse;
 use ftheta_physics::galvo::Galvo;
@@ -31,6 +32,8 @@ use heat::Heat;
 use kurbo::Point;
 use marking::Marking;
 use smoothing::Smoothing;
+use std::num::NonZero;
+use std::thread;
 use weave::{Mover, Weave};
 
 /// How much of the machine planned motion may use: how much the servo's answer needs besides is
@@ -119,67 +122,112 @@ pub fn is_servo_known(machine: &Machine) -> bool {
     feedback && machine.output.drive != Drive::BlackBox
 }
 
-/// The content of a plan, before the audit.
-///
-/// The beam starts and ends in the field centre.
-///
-/// # Errors
-/// If a pen is out of the machine's range, a mark cannot be reached, or a program fails.
-pub fn draft(
-    toolpath: Toolpath,
-    machine: &Machine,
-    motions: Motions<'_>,
-    options: &OptimalOptions,
-) -> Result<PlanDraft, PlanError> {
-    if toolpath.marks.is_empty() {
-        return Err(PlanError::Empty);
+/// Plans jobs on one machine; what does not depend on the job is prepared once.
+pub struct OptimalPlanner<'a> {
+    machine: &'a Machine,
+    corners: Option<&'a Corners>,
+    options: OptimalOptions,
+    galvo: Galvo,
+    inverse: Inverse,
+    smoothing: Smoothing,
+    lag_s: f64,
+    mover: Mover<'a>,
+}
+
+impl<'a> OptimalPlanner<'a> {
+    /// Prepares for jobs.
+    ///
+    /// # Errors
+    /// If the servo cannot be designed, or no voltage moves the mirrors.
+    pub fn new(
+        machine: &'a Machine,
+        motions: Motions<'a>,
+        options: OptimalOptions,
+    ) -> Result<Self, PlanError> {
+        let galvo = Galvo::new(&machine.scanner);
+        let tick_s = machine.output.period_s();
+        let gains = Gains::design(&machine.scanner, tick_s)?;
+        let inverse = Inverse::new(&galvo, &gains, tick_s).ok_or(PlanError::Immovable)?;
+        let lag_s = gains.lag_s(&galvo);
+        let mut smoothing = Smoothing::new(machine, &galvo, &gains, &inverse);
+        let (mover, corners) = match motions {
+            Motions::Known { transitions, corners } => {
+                let current_share = 1.0 - 0.5 * options.restraint.current_reserve;
+                let current_max_a = current_share * machine.scanner.current_max_a;
+                let reserve = options.voltage_reserve;
+                let fly_by = FlyBy::new(transitions, machine, gains, reserve, current_max_a);
+                (Mover::Voltage(fly_by), Some(corners))
+            }
+            Motions::Lag => {
+                smoothing = smoothing.with_servo(lag_s);
+                (Mover::Angle(Glide::new(machine, lag_s), lag_s), None)
+            }
+        };
+        Ok(Self { machine, corners, options, galvo, inverse, smoothing, lag_s, mover })
     }
-    toolpath.pens.iter().try_for_each(|pen| check_pen(pen, machine))?;
-    let galvo = Galvo::new(&machine.scanner);
-    let tick_s = machine.output.period_s();
-    let gains = Gains::design(&machine.scanner, tick_s)?;
-    let inverse = Inverse::new(&galvo, &gains, tick_s).ok_or(PlanError::Immovable)?;
-    let lag_s = gains.lag_s(&galvo);
-    let mut smoothing = Smoothing::new(machine, &galvo, &gains, &inverse);
-    let Restraint { heat_share, current_reserve, .. } = options.restraint;
-    let (mover, corners) = match motions {
-        Motions::Known { transitions, corners } => {
-            let current_max_a = (1.0 - 0.5 * current_reserve) * machine.scanner.current_max_a;
-            let reserve = options.voltage_reserve;
-            let fly_by = FlyBy::new(transitions, machine, gains, reserve, current_max_a);
-            (Mover::Voltage(fly_by), Some(corners))
+
+    /// Solves what a toolpath needs, on all processors, so that [`Self::draft`] finds it solved.
+    ///
+    /// Nothing comes of marks that cannot be planned; the draft tells of them.
+    pub fn solve(&self, toolpath: &Toolpath) {
+        if toolpath.pens.iter().any(|pen| check_pen(pen, self.machine).is_err()) {
+            return;
         }
-        Motions::Lag => {
-            smoothing = smoothing.with_servo(lag_s);
-            (Mover::Angle(Glide::new(machine, lag_s), lag_s), None)
+        let n_threads = thread::available_parallelism().map_or(1, NonZero::get);
+        let n_marks = toolpath.marks.len();
+        let n_each = n_marks.div_ceil(n_threads).max(1);
+        thread::scope(|scope| {
+            for first in (0..n_marks).step_by(n_each) {
+                // With the mark before, for the way from it to the first.
+                let marks = &toolpath.marks[first.saturating_sub(1)..n_marks.min(first + n_each)];
+                let (starts, ends) = (first == 0, first + n_each >= n_marks);
+                scope.spawn(move || {
+                    let mut marking = self.marking(toolpath.pens.clone(), marks.len());
+                    let _ = marking.all(marks.iter().cloned(), [starts, ends]);
+                });
+            }
+        });
+    }
+
+    /// The content of a plan, before the audit.
+    ///
+    /// The beam starts and ends in the field centre.
+    ///
+    /// # Errors
+    /// If a pen is out of the machine's range, a mark cannot be reached, or a program fails.
+    pub fn draft(&self, toolpath: Toolpath) -> Result<PlanDraft, PlanError> {
+        let Toolpath { pens, marks } = toolpath;
+        if marks.is_empty() {
+            return Err(PlanError::Empty);
         }
-    };
-    let Toolpath { pens, marks } = toolpath;
-    let draft = PlanDraft {
-        machine: machine.clone(),
-        planner: Planner::Optimal,
-        tolerance_mm: options.tolerance_mm,
-        pens,
-        marks: Vec::with_capacity(marks.len()),
-        vertices: Vec::new(),
-        stations: Vec::new(),
-        knots: Vec::new(),
-        drives: Vec::new(),
-        segments: Vec::new(),
-    };
-    let heat = Heat::new(machine, heat_share);
-    let weave = Weave::new(machine, &inverse, &smoothing, mover, heat, draft);
-    let run_s = RUN_LAGS.map(|lags| if corners.is_some() { 0.0 } else { lags * lag_s });
-    let mut marking = Marking { weave, options, corners, galvo, run_s };
-    marking.weave.rest_in_centre(N_REST_TICKS);
-    for mark in marks {
-        marking.mark(mark)?;
+        pens.iter().try_for_each(|pen| check_pen(pen, self.machine))?;
+        let mut marking = self.marking(pens, marks.len());
+        marking.all(marks, [true; 2])?;
+        marking.weave.rest_in_centre(lead_out_ticks(self.machine, self.lag_s));
+        Ok(marking.weave.draft)
     }
-    if !marking.weave.fly_home()? {
-        return Err(PlanError::NoRoom { place: "the way back to the centre".into() });
+
+    /// Before the first of so many marks.
+    fn marking(&self, pens: Vec<Pen>, n_marks: usize) -> Marking<'_> {
+        let Self { machine, corners, lag_s, .. } = *self;
+        let draft = PlanDraft {
+            machine: machine.clone(),
+            planner: Planner::Optimal,
+            tolerance_mm: self.options.tolerance_mm,
+            pens,
+            marks: Vec::with_capacity(n_marks),
+            vertices: Vec::new(),
+            stations: Vec::new(),
+            knots: Vec::new(),
+            drives: Vec::new(),
+            segments: Vec::new(),
+        };
+        let heat = Heat::new(machine, self.options.restraint.heat_share);
+        let weave =
+            Weave::new(machine, &self.inverse, &self.smoothing, &self.mover, heat, draft);
+        let run_s = RUN_LAGS.map(|lags| if corners.is_some() { 0.0 } else { lags * lag_s });
+        Marking { weave, options: &self.options, corners, galvo: self.galvo, run_s }
     }
-    marking.weave.rest_in_centre(lead_out_ticks(machine, lag_s));
-    Ok(marking.weave.draft)
 }
 
 /// The longest step that an axis takes from the centre through the marks and back, rad.

@@ -217,7 +217,7 @@ fn corners_are_the_same_whenever_and_wherever_they_are_solved() {
     let (_, _, others) = robust();
     assert_eq!(ask(&others), corner);
     let (_, _, restored) = robust();
-    restored.restore(corners.solved());
+    restored.restore(&corners.solved());
     assert_eq!(restored.solved().len(), 2);
     assert_eq!(ask(&restored), corner);
 }

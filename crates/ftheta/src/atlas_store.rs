@@ -1,11 +1,15 @@
-//! Jump atlases and tuned delays kept on disk between runs, one file for each machine and setting.
+//! Jump atlases, solved programs and tuned delays kept on disk between runs, one file of each for
+//! each machine and setting.
 
 use crate::Error;
 use ftheta_formats::atlas_file::{self, AtlasLevel};
 use ftheta_formats::cache_key::CacheKey;
+use ftheta_formats::solved_file;
 use ftheta_model::machine::Scanner;
 use ftheta_model::warning::Warning;
-use ftheta_planner::jump::{ATLAS_VERSION, Atlas, AxisOptions, Level, Model};
+use ftheta_planner::corner::Corners;
+use ftheta_planner::jump::{ATLAS_VERSION, Atlas, AxisOptions, Level, Model, Transitions};
+use ftheta_planner::solved::{SOLVED_VERSION, Solved};
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -50,6 +54,49 @@ impl AtlasStore {
             *level = Level { steps_rad, sequences_v };
         });
         Ok(Atlas::restore(scanner, axis, levels)?)
+    }
+
+    /// Gives transitions and corners back what programs have solved for them before.
+    pub(crate) fn restore(
+        &self,
+        transitions: &Transitions,
+        corners: &Corners,
+        warnings: &mut Vec<Warning>,
+    ) {
+        let solved = self.read_solved(solved_key(transitions.atlas()), warnings);
+        transitions.restore(&solved);
+        corners.restore(&solved);
+    }
+
+    /// Keeps what programs have solved for transitions and corners, besides what is kept already.
+    pub(crate) fn save_solved(
+        &self,
+        transitions: &Transitions,
+        corners: &Corners,
+        warnings: &mut Vec<Warning>,
+    ) {
+        if self.folder.is_none() {
+            return;
+        }
+        let key = solved_key(transitions.atlas());
+        // Read again, since another process may have kept more meanwhile; told of when it was read
+        // first.
+        let mut kept = self.read_solved(key, &mut Vec::new());
+        let mut solved = transitions.solved();
+        solved.append(&mut corners.solved());
+        if solved.keys().all(|which| kept.contains_key(which)) {
+            return;
+        }
+        solved.append(&mut kept);
+        let bytes = solved_file::write(key, &solved);
+        self.write(&key.file_name("solved"), "solved programs", warnings, &bytes);
+    }
+
+    fn read_solved(&self, key: CacheKey, warnings: &mut Vec<Warning>) -> Solved {
+        let kept = self.read(&key.file_name("solved"), "solved programs", warnings, |bytes| {
+            solved_file::read(bytes, key).map_err(|error| error.to_string())
+        });
+        kept.unwrap_or_default()
     }
 
     /// Keeps an atlas.
@@ -117,8 +164,20 @@ fn publish(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
+/// Everything that decides what programs give: what decides the atlas, and what corners have besides.
+fn solved_key(atlas: &Atlas) -> CacheKey {
+    let (scanner, axis) = (atlas.scanner(), atlas.axis_options());
+    let besides = [scanner.kt_uncertainty, scanner.speed_max_rad_s];
+    let servo = scanner.servo;
+    CacheKey::of(&format!("{SOLVED_VERSION} {besides:?} {servo:?} {}", key_text(scanner, axis)))
+}
+
 /// Everything that decides an atlas: numbers as their shortest text that reads back the same.
 fn key(scanner: &Scanner, axis: AxisOptions) -> CacheKey {
+    CacheKey::of(&key_text(scanner, axis))
+}
+
+fn key_text(scanner: &Scanner, axis: AxisOptions) -> String {
     let numbers = [
         scanner.rotor_inertia_kg_m2,
         scanner.mirror_inertia_kg_m2,
@@ -136,5 +195,5 @@ fn key(scanner: &Scanner, axis: AxisOptions) -> CacheKey {
         Model::Held { .. } => Some((scanner.servo, scanner.kt_uncertainty)),
         Model::Rigid | Model::Flexible | Model::Robust { .. } | Model::Closest { .. } => None,
     };
-    CacheKey::of(&format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}"))
+    format!("{ATLAS_VERSION} {numbers:?} {axis:?} {held:?}")
 }

@@ -12,7 +12,7 @@ use ftheta_physics::servo::Gains;
 use ftheta_planner::classic::{self, Settings};
 use ftheta_planner::corner::Corners;
 use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
-use ftheta_planner::optimal::{self, Motions, OptimalOptions, Restraint};
+use ftheta_planner::optimal::{self, Motions, OptimalOptions, OptimalPlanner, Restraint};
 
 /// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
 /// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
@@ -57,7 +57,8 @@ impl Planning<'_> {
     ) -> Result<Plan, Error> {
         observer(Stage::Plan);
         let optimal = self.optimal(optimal::RESTRAINTS[0], self.options.reserve);
-        let draft = optimal::draft(toolpath, self.machine, Motions::Lag, &optimal)?;
+        let planner = OptimalPlanner::new(self.machine, Motions::Lag, optimal)?;
+        let draft = planner.draft(toolpath)?;
         observer(Stage::Audit);
         Ok(Plan::new(draft)?)
     }
@@ -86,7 +87,12 @@ impl Planning<'_> {
             let scanner = transitions.atlas().scanner().clone();
             let corners = Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
             let motions = Motions::Known { transitions: &transitions, corners: &corners };
-            let draft = optimal::draft(toolpath.clone(), machine, motions, &optimal)?;
+            let planner = OptimalPlanner::new(machine, motions, optimal)?;
+            options.atlas_store.restore(&transitions, &corners, warnings);
+            planner.solve(toolpath);
+            let draft = planner.draft(toolpath.clone());
+            options.atlas_store.save_solved(&transitions, &corners, warnings);
+            let draft = draft?;
             observer(Stage::Audit);
             match Plan::new(draft) {
                 Ok(plan) => return Ok(plan),
@@ -135,7 +141,7 @@ impl Planning<'_> {
         if atlas.n_sequences() > n_kept {
             options.atlas_store.save(&atlas, warnings);
         }
-        Ok(atlas)
+        Ok(atlas.up_to(longest_rad))
     }
 
     fn plan_classic(

@@ -50,6 +50,36 @@ pub struct Side {
 }
 
 impl Side {
+    /// All of it as numbers.
+    pub(super) fn numbers(&self) -> Vec<f64> {
+        let Self { speed_rad_s, run_rad, loss_s, least_loss_s, .. } = *self;
+        let head = [speed_rad_s, self.n_before as f64, run_rad, loss_s, least_loss_s];
+        [&head, &self.voltages_v[..], &self.mirror_rad[..]].concat()
+    }
+
+    /// The side of [`Self::numbers`]; `None` if they are not of one.
+    pub(super) fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        let (head, ticks) = numbers.split_first_chunk()?;
+        let &[speed_rad_s, n_before, run_rad, loss_s, least_loss_s] = head;
+        let (voltages_v, mirror_rad) = ticks.split_at(ticks.len() / 2);
+        let n_before = n_before as usize;
+        let whole = numbers.iter().all(|number| number.is_finite())
+            && speed_rad_s > 0.0
+            && mirror_rad.len() == voltages_v.len() + 1
+            && n_before <= voltages_v.len();
+        let (voltages_v, mirror_rad) = (voltages_v.to_vec(), mirror_rad.to_vec());
+        let side = Self {
+            speed_rad_s,
+            n_before,
+            voltages_v,
+            mirror_rad,
+            run_rad,
+            loss_s,
+            least_loss_s,
+        };
+        whole.then_some(side)
+    }
+
     /// The same at another speed: everything scales with it, the band as well.
     pub(super) fn scaled(mut self, speed_rad_s: f64) -> Self {
         let factor = speed_rad_s / self.speed_rad_s;

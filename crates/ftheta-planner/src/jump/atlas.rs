@@ -173,6 +173,17 @@ impl Atlas {
         Ok(is_short(&self.levels[0]))
     }
 
+    /// The atlas without what lies beyond the first number of ticks that covers a step: the same
+    /// however far it had grown for others.
+    pub fn up_to(mut self, step_rad: f64) -> Self {
+        let n_needed = 1 + self.steps_rad().partition_point(|&reach| reach < step_rad);
+        for level in &mut self.levels {
+            level.steps_rad.truncate(n_needed);
+            level.sequences_v.truncate(n_needed);
+        }
+        self
+    }
+
     /// Makes a level cover so many ticks.
     ///
     /// # Errors
@@ -257,6 +268,14 @@ impl Atlas {
     /// Voltages of the longest step of each number of ticks, V; the index is the number.
     pub fn sequences_v(&self) -> &[Vec<f64>] {
         &self.levels[0].sequences_v
+    }
+
+    /// Step (rad) and voltages of exactly so many ticks, if a program of its own gave them.
+    pub(super) fn solved(&self, n_ticks: usize) -> Option<(f64, &[f64])> {
+        let Level { steps_rad, sequences_v } = &self.levels[0];
+        let before = n_ticks.checked_sub(1).filter(|_| n_ticks <= N_SEGMENTS)?;
+        let step_rad = *steps_rad.get(n_ticks)?;
+        (step_rad > steps_rad[before]).then(|| (step_rad, &sequences_v[n_ticks][..]))
     }
 
     /// The scanner that the atlas is for.

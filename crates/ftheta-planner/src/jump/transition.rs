@@ -8,6 +8,7 @@ use super::brake::{Brakes, End, Fit};
 use super::fan::{Ask, Fan, Sum, Term};
 use super::program::Way;
 use super::{Atlas, AtlasOptions, Axis, AxisOptions, JumpError};
+use crate::solved::{RAY, Solved, of_kind};
 use ftheta_model::machine::Scanner;
 use ftheta_physics::galvo::{CURRENT, State};
 use std::sync::OnceLock;
@@ -28,7 +29,7 @@ const N_TICKS_STRAIGHT: usize = 150;
 /// Periods of the mode by which a stop or start without room to spare is longer than others.
 const N_SWINGS: f64 = 2.0;
 /// A displacement may exceed the longest step of its ticks by this part, when the ends move.
-const SLACK: f64 = 1.02;
+const SLACK: f64 = 1.1;
 /// Rounding that an angle, speed or current may carry.
 const ROUNDING: f64 = 1e-9;
 
@@ -70,7 +71,7 @@ pub struct Transitions {
     angle_max_rad: f64,
     speed_max_rad_s: f64,
     /// One for each number of ticks of the schedule.
-    fans: Vec<(usize, OnceLock<Result<Fan, JumpError>>)>,
+    fans: Vec<Fan>,
     brakes: OnceLock<Result<[Brakes; 2], JumpError>>,
 }
 
@@ -127,7 +128,7 @@ impl Transitions {
         let mut n_ticks = N_TICKS_MIN;
         let mut fans = Vec::new();
         while n_ticks <= N_TICKS_MAX {
-            fans.push((n_ticks, OnceLock::new()));
+            fans.push(Fan::new(&atlas, n_ticks));
             n_ticks += match n_ticks {
                 ..N_TICKS_EACH => 1,
                 N_TICKS_EACH..128 => 2,
@@ -150,6 +151,26 @@ impl Transitions {
         &self.atlas
     }
 
+    /// The rays of fans that are solved so far, without those that come from the atlas.
+    pub fn solved(&self) -> Solved {
+        let rays = self.fans.iter().flat_map(|fan| {
+            let key = |index: usize| [RAY, fan.n_ticks() as i32, index as i32, 0];
+            fan.solved(&self.atlas).map(move |(index, numbers)| (key(index), numbers))
+        });
+        rays.collect()
+    }
+
+    /// Takes back what [`Self::solved`] gave of the same scanner and options; what does not fit is
+    /// left out.
+    pub fn restore(&self, solved: &Solved) {
+        for ([n_ticks, index, _], numbers) in of_kind(solved, RAY) {
+            let fan = self.fans.binary_search_by_key(&n_ticks, |fan| fan.n_ticks() as i32);
+            if let (Ok(fan), Ok(index)) = (fan, usize::try_from(index)) {
+                self.fans[fan].restore(index, numbers);
+            }
+        }
+    }
+
     /// The voltages of a route, or `None` if no motion within the angles makes it.
     ///
     /// # Errors
@@ -166,7 +187,8 @@ impl Transitions {
         if let Some(rest) = self.rest(route) {
             return Ok(Some(rest));
         }
-        for (n_ticks, transition) in self.candidates(*route) {
+        for [transition] in self.candidates([*route]) {
+            let n_ticks = transition.n_ticks();
             n_last = n_last.min((n_ticks as f64 * (1.0 + LONGER)) as usize + 4);
             if n_ticks > n_last {
                 break;
@@ -218,12 +240,9 @@ impl Transitions {
     /// As [`Self::plan`].
     pub fn plan_both(&self, routes: &[Route; 2]) -> Result<Option<[Transition<'_>; 2]>, JumpError> {
         routes.iter().try_for_each(|route| self.check(route))?;
-        for (n_ticks, first) in self.candidates(routes[0]) {
-            let Some(second) = self.meet(&routes[1], n_ticks) else {
-                continue;
-            };
-            if self.keeps_limits(&routes[0], &first) && self.keeps_limits(&routes[1], &second) {
-                return Ok(Some([first, second]));
+        for pair in self.candidates(*routes) {
+            if routes.iter().zip(&pair).all(|(route, one)| self.keeps_limits(route, one)) {
+                return Ok(Some(pair));
             }
         }
         let [first, second] = routes;
@@ -237,30 +256,45 @@ impl Transitions {
         Ok(self.detour(first, other.n_ticks())?.map(|one| [one, other]))
     }
 
-    /// Numbers of ticks that meet the ends, with their voltages.
-    fn candidates(&self, route: Route) -> impl Iterator<Item = (usize, Transition<'_>)> {
-        self.fans
-            .iter()
-            .filter(move |(n_ticks, _)| self.may_meet(&route, *n_ticks))
-            .filter_map(move |&(n_ticks, _)| Some((n_ticks, self.meet(&route, n_ticks)?)))
+    /// Voltages that meet the ends of all routes, by number of ticks.
+    fn candidates<const N: usize>(
+        &self,
+        routes: [Route; N],
+    ) -> impl Iterator<Item = [Transition<'_>; N]> {
+        // The last fan that did not reach far enough, for each route.
+        let mut short: [Option<&Fan>; N] = [None; N];
+        self.fans.iter().filter_map(move |fan| {
+            let n_ticks = fan.n_ticks();
+            let may = |(route, short): (&Route, &Option<&Fan>)| {
+                self.may_meet(route, n_ticks)
+                    && short.is_none_or(|fan| fan.may_grow_to(&self.axis, &ask(route), n_ticks))
+            };
+            if !routes.iter().zip(&short).all(may) {
+                return None;
+            }
+            let mut met = [const { None }; N];
+            for ((route, short), met) in routes.iter().zip(&mut short).zip(&mut met) {
+                let sum = fan.meet(&self.axis, &ask(route));
+                if sum.is_none() {
+                    *short = Some(fan);
+                }
+                *met = Some(Transition::single(sum?));
+            }
+            Some(met.map(|one| one.expect("all routes are met")))
+        })
     }
 
     /// Whether a number of ticks is worth solving its fan for.
     fn may_meet(&self, route: &Route, n_ticks: usize) -> bool {
         let ask = ask(route);
         let duration_s = n_ticks as f64 * self.axis.tick_s;
-        let mean_rad_s = 0.5 * (ask.from_rad_s + ask.to_rad_s);
-        let displacement = (ask.distance_rad - mean_rad_s * duration_s).abs();
+        let displacement = ask.displacement_rad(duration_s).abs();
         let gain_max = self.axis.acceleration_max_rad_s2() * duration_s;
+        let gained = ask.gain_rad_s().abs() / gain_max;
+        // The greatest torque one way, then the other.
+        let farthest_rad = 0.25 * gain_max * duration_s * (1.0 - gained * gained);
         let longest = self.atlas.steps_rad().get(n_ticks).copied().unwrap_or(f64::INFINITY);
-        displacement <= SLACK * longest && (ask.to_rad_s - ask.from_rad_s).abs() <= gain_max
-    }
-
-    /// The voltages of a route in a number of ticks of the schedule, whatever its angles.
-    fn meet(&self, route: &Route, n_ticks: usize) -> Option<Transition<'_>> {
-        let index = self.fans.binary_search_by_key(&n_ticks, |(n_ticks, _)| *n_ticks).ok()?;
-        let fan = self.fans[index].1.get_or_init(|| Fan::build(&self.axis, n_ticks));
-        fan.as_ref().ok()?.meet(&ask(route)).map(Transition::single)
+        displacement <= SLACK * longest.min(farthest_rad) && gained <= 1.0
     }
 
     /// Rest to rest, from the atlas.

@@ -11,7 +11,7 @@ use ftheta_physics::audit::COMMAND_SHARE;
 use ftheta_physics::galvo::{CURRENT, Galvo, State, Step};
 use ftheta_physics::servo::Gains;
 use nalgebra::{SMatrix, SVector};
-use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// Factors by which a transition is prolonged, where heat or the angles do not allow it faster.
 const LONGER: [f64; 10] = [1.0, 1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.6, 5.0, 8.0];
@@ -38,8 +38,8 @@ pub(super) struct FlyBy<'a> {
     gains: Gains,
     voltage_max_v: f64,
     current_max_a: f64,
-    /// Voltages of least square per number of ticks.
-    least: BTreeMap<usize, Vec<State>>,
+    /// Voltages of least square per number of ticks, once they are needed.
+    least: Vec<OnceLock<Option<Vec<State>>>>,
     /// Scales of the states, so that none is lost beside another.
     units: State,
 }
@@ -67,7 +67,7 @@ impl<'a> FlyBy<'a> {
             gains,
             voltage_max_v: free * scanner.voltage_max_v,
             current_max_a,
-            least: BTreeMap::new(),
+            least: vec![OnceLock::new(); N_TICKS_MAX + 1],
             units: State::new(speed * tick_s, speed, speed * tick_s, speed, scanner.current_max_a),
         }
     }
@@ -78,7 +78,7 @@ impl<'a> FlyBy<'a> {
     /// # Errors
     /// If a program fails.
     pub(super) fn between(
-        &mut self,
+        &self,
         from: &States,
         to: &States,
         heat: &Heat,
@@ -117,7 +117,7 @@ impl<'a> FlyBy<'a> {
 
     /// Adds what makes both ends exact.
     pub(super) fn corrected(
-        &mut self,
+        &self,
         mut voltages: Voltages,
         from: &States,
         to: &States,
@@ -148,12 +148,9 @@ impl<'a> FlyBy<'a> {
     }
 
     /// Weights of a change of state in each voltage that makes it with the least square.
-    fn least(&mut self, n_ticks: usize) -> Option<&[State]> {
-        if !self.least.contains_key(&n_ticks) {
-            let weights = least_square(&self.step, &self.units, n_ticks)?;
-            self.least.insert(n_ticks, weights);
-        }
-        self.least.get(&n_ticks).map(Vec::as_slice)
+    fn least(&self, n_ticks: usize) -> Option<&[State]> {
+        let solve = || least_square(&self.step, &self.units, n_ticks);
+        self.least.get(n_ticks)?.get_or_init(solve).as_deref()
     }
 
     /// Whether voltages keep every limit of motor, mirror and output word.

@@ -4,7 +4,7 @@ use super::path::Path;
 use super::speed::{SpeedLimits, averaged_mm, profile, time_at_s};
 use super::turn::{Allowance, Turn, candidates, straight_mm};
 use super::weave::{Laid, Stretch, Weave};
-use super::{Corner, OptimalOptions};
+use super::{Corner, N_REST_TICKS, OptimalOptions};
 use crate::PlanError;
 use crate::corner::Corners;
 use ftheta_model::plan::{Knot, PlannedMark};
@@ -54,6 +54,25 @@ struct Piece {
 type Powers = Vec<(f64, f64)>;
 
 impl Marking<'_> {
+    /// Makes all marks, from the centre and back to it if so wanted.
+    ///
+    /// # Errors
+    /// As [`Self::mark`].
+    pub(super) fn all(
+        &mut self,
+        marks: impl IntoIterator<Item = Mark>,
+        [from_centre, to_centre]: [bool; 2],
+    ) -> Result<(), PlanError> {
+        if from_centre {
+            self.weave.rest_in_centre(N_REST_TICKS);
+        }
+        marks.into_iter().try_for_each(|mark| self.mark(mark))?;
+        if to_centre && !self.weave.fly_home()? {
+            return Err(PlanError::NoRoom { place: "the way back to the centre".into() });
+        }
+        Ok(())
+    }
+
     /// Flies to a mark and makes it.
     ///
     /// # Errors
@@ -247,7 +266,7 @@ impl Marking<'_> {
 
     /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
     /// than the motors stand.
-    fn joints(&mut self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
+    fn joints(&self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
         let mut joints = Vec::with_capacity(turns.len());
         for (turn, pair) in turns.iter().zip(pieces.windows(2)) {
             let voltages = turn.voltages_v([pair[0].part, pair[1].part]);

@@ -31,12 +31,12 @@ pub(super) struct Weave<'a> {
     pub(super) machine: &'a Machine,
     pub(super) inverse: &'a Inverse,
     pub(super) smoothing: &'a Smoothing,
-    pub(super) mover: Mover<'a>,
+    pub(super) mover: &'a Mover<'a>,
     pub(super) draft: PlanDraft,
     n_samples: u64,
     heat: Heat,
-    /// Where the axes are at the end of what is planned.
-    states: States,
+    /// Where the axes are at the end of what is planned; `None` as long as they may be anywhere.
+    states: Option<States>,
     period_s: f64,
 }
 
@@ -63,13 +63,13 @@ impl<'a> Weave<'a> {
         machine: &'a Machine,
         inverse: &'a Inverse,
         smoothing: &'a Smoothing,
-        mover: Mover<'a>,
+        mover: &'a Mover<'a>,
         heat: Heat,
         draft: PlanDraft,
     ) -> Self {
-        let states = [State::zeros(); 2];
         let period_s = machine.output.period_s();
-        Self { machine, inverse, smoothing, mover, draft, n_samples: 0, heat, states, period_s }
+        let (n_samples, states) = (0, None);
+        Self { machine, inverse, smoothing, mover, draft, n_samples, heat, states, period_s }
     }
 
     /// Stays in the centre for so many ticks.
@@ -78,13 +78,13 @@ impl<'a> Weave<'a> {
         let vertex = (self.draft.vertices.len() - 1) as u32;
         self.push(None, n_ticks, Motion::Hold { vertex });
         self.heat.cool(n_ticks);
-        self.states = [State::zeros(); 2];
+        self.states = Some([State::zeros(); 2]);
     }
 
     /// Time of the mirrors at the end of what is planned, s: computed voltages act a tick after
     /// their sample, angles that are sent are reached after the lag.
     pub(super) fn now_s(&self) -> f64 {
-        match &self.mover {
+        match self.mover {
             Mover::Voltage(_) => (self.n_samples + 1) as f64 * self.period_s,
             Mover::Angle(_, lag_s) => (self.n_samples as f64 - 1.0) * self.period_s + lag_s,
         }
@@ -96,7 +96,7 @@ impl<'a> Weave<'a> {
 
     /// Whether the motors stand these voltages from a state, with the heat they have.
     pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States) -> bool {
-        match &self.mover {
+        match self.mover {
             Mover::Voltage(fly_by) => fly_by.allows(voltages, from, &self.heat),
             Mover::Angle(..) => false,
         }
@@ -104,12 +104,12 @@ impl<'a> Weave<'a> {
 
     /// Voltages that join states exactly, near the ones given.
     pub(super) fn corrected(
-        &mut self,
+        &self,
         voltages: Voltages,
         from: &States,
         to: &States,
     ) -> Option<Voltages> {
-        match &mut self.mover {
+        match self.mover {
             Mover::Voltage(fly_by) => fly_by.corrected(voltages, from, to),
             Mover::Angle(..) => None,
         }
@@ -171,15 +171,17 @@ impl<'a> Weave<'a> {
     }
 
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
-        let motion = match &mut self.mover {
-            Mover::Voltage(fly_by) => fly_by.between(&self.states, &to, &self.heat)?,
-            Mover::Angle(glide, _) => glide.between(&self.states, &to),
-        };
-        let Some(pairs) = motion else {
-            return Ok(false);
-        };
-        self.drive(None, &pairs);
-        self.states = to;
+        if let Some(from) = &self.states {
+            let motion = match self.mover {
+                Mover::Voltage(fly_by) => fly_by.between(from, &to, &self.heat)?,
+                Mover::Angle(glide, _) => glide.between(from, &to),
+            };
+            let Some(pairs) = motion else {
+                return Ok(false);
+            };
+            self.drive(None, &pairs);
+        }
+        self.states = Some(to);
         Ok(true)
     }
 
@@ -188,14 +190,14 @@ impl<'a> Weave<'a> {
         let first = self.draft.drives.len() as u32;
         self.draft.drives.extend(pairs.iter().map(|pair| pair.map(|value| value as f32)));
         self.push(mark_index, pairs.len() as u32, Motion::Drive { first });
-        let Mover::Voltage(fly_by) = &self.mover else {
+        let (Mover::Voltage(fly_by), Some(states)) = (self.mover, &mut self.states) else {
             return;
         };
         for pair in pairs {
-            for axis in 0..2 {
-                self.states[axis] = fly_by.advance(&self.states[axis], pair[axis]);
+            for (state, &voltage_v) in states.iter_mut().zip(pair) {
+                *state = fly_by.advance(state, voltage_v);
             }
-            self.heat.tick([self.states[0][CURRENT], self.states[1][CURRENT]]);
+            self.heat.tick([states[0][CURRENT], states[1][CURRENT]]);
         }
     }
 
@@ -203,7 +205,7 @@ impl<'a> Weave<'a> {
     pub(super) fn follow(&mut self, mark_index: u32, laid: &Laid) {
         self.push(Some(mark_index), laid.n_ticks, laid.motion);
         self.heat.cool(laid.n_ticks);
-        self.states = laid.ends;
+        self.states = Some(laid.ends);
     }
 
     fn push(&mut self, mark_index: Option<u32>, n_ticks: u32, motion: Motion) {
