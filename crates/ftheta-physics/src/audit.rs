@@ -55,6 +55,16 @@ pub struct Limits {
     pub violations: u64,
 }
 
+/// What the audit found in a plan that it lets pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Audited {
+    /// Peaks relative to the machine's limits.
+    pub limits: Limits,
+    /// Greatest distance of the lit nominal beam from its mark at ticks, mm; `None` for a plan that
+    /// promises none: a classic one, or one for a head whose servo is not known.
+    pub planned_error_mm: Option<f64>,
+}
+
 /// What the audit refuses.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -153,7 +163,7 @@ impl AuditError {
 /// # Errors
 /// The first thing that the machine does not allow. Angle and speed may use 97.3 % of their limits
 /// (see [`CORRECTION_RESERVE`]).
-pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
+pub fn audit(draft: &PlanDraft) -> Result<Audited, AuditError> {
     let scanner = &draft.machine.scanner;
     let (galvo, tick_s) = (Galvo::new(scanner), draft.machine.output.period_s());
     let gains = Gains::design(scanner, tick_s)?;
@@ -183,7 +193,7 @@ pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
         // The samples before this one have moved the mirrors to the end of its tick.
         beam.sample(meter.n_samples as f64 * period_ns, meter.angles())?;
     }
-    Ok(meter.limits)
+    Ok(Audited { limits: meter.limits, planned_error_mm: beam.worst_mm() })
 }
 
 /// Drives the nominal axes and keeps the peaks.

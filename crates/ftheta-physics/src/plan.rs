@@ -1,6 +1,6 @@
 //! A plan: audited motion and laser edges, immutable, with an id that is a hash of its content.
 
-use crate::audit::{AuditError, Limits, audit};
+use crate::audit::{AuditError, Audited, Limits, audit};
 use ftheta_model::machine::{Drive, Lens, Machine, Servo};
 use ftheta_model::plan::{Motion, PlanDraft};
 use ftheta_model::recipe::Interpolation;
@@ -17,7 +17,7 @@ use std::ops::Deref;
 pub struct Plan {
     draft: PlanDraft,
     id: PlanId,
-    limits: Limits,
+    audited: Audited,
 }
 
 /// Hash of a plan's content.
@@ -30,9 +30,9 @@ impl Plan {
     /// # Errors
     /// The first thing in the plan that the machine does not allow.
     pub fn new(draft: PlanDraft) -> Result<Self, AuditError> {
-        let limits = audit(&draft)?;
+        let audited = audit(&draft)?;
         let id = PlanId::of(&draft);
-        Ok(Self { draft, id, limits })
+        Ok(Self { draft, id, audited })
     }
 
     /// Hash of the plan's content, printed wherever the plan is named.
@@ -42,7 +42,13 @@ impl Plan {
 
     /// Peaks that the audit found, relative to the machine's limits.
     pub fn limits(&self) -> &Limits {
-        &self.limits
+        &self.audited.limits
+    }
+
+    /// Greatest distance of the lit nominal beam from its mark that the audit found, mm; see
+    /// [`Audited`].
+    pub fn planned_error_mm(&self) -> Option<f64> {
+        self.audited.planned_error_mm
     }
 }
 

@@ -1,7 +1,7 @@
 //! From vectors to segments: marks and jumps at constant speed with a classic controller's delays.
 
 use crate::PlanError;
-use crate::classic::{Settings, check_pen, legs};
+use crate::classic::{Settings, check_pen, fastest_mm_s, legs};
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, PlannedMark, Planner, Segment, SpeedProfile};
 use ftheta_model::recipe::{Interpolation, Pen};
@@ -22,7 +22,8 @@ pub(crate) fn draft(
         return Err(PlanError::Empty);
     }
     settings.check(machine)?;
-    toolpath.pens.iter().try_for_each(|pen| check_pen(pen, machine))?;
+    let fastest_mm_s = fastest_mm_s(machine);
+    toolpath.pens.iter().try_for_each(|pen| check_pen(pen, machine, fastest_mm_s))?;
     let n_vertices = toolpath.marks.iter().map(|mark| mark.points.len()).sum::<usize>() + 2;
     let mut builder = Builder {
         machine,

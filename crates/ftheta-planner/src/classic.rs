@@ -13,7 +13,7 @@ use ftheta_model::toolpath::Toolpath;
 use ftheta_physics::plan::Plan;
 pub(crate) use legs::legs;
 pub use settings::Settings;
-pub(crate) use settings::check_pen;
+pub(crate) use settings::{check_pen, fastest_mm_s};
 
 /// Plans a toolpath as a classic controller would play it, and audits the plan.
 ///

@@ -170,7 +170,7 @@ impl<'a> OptimalPlanner<'a> {
     ///
     /// Nothing comes of marks that cannot be planned; the draft tells of them.
     pub fn solve(&self, toolpath: &Toolpath) {
-        if toolpath.pens.iter().any(|pen| check_pen(pen, self.machine).is_err()) {
+        if toolpath.pens.iter().any(|pen| check_pen(pen, self.machine, f64::INFINITY).is_err()) {
             return;
         }
         let n_threads = thread::available_parallelism().map_or(1, NonZero::get);
@@ -200,7 +200,7 @@ impl<'a> OptimalPlanner<'a> {
         if marks.is_empty() {
             return Err(PlanError::Empty);
         }
-        pens.iter().try_for_each(|pen| check_pen(pen, self.machine))?;
+        pens.iter().try_for_each(|pen| check_pen(pen, self.machine, f64::INFINITY))?;
         let mut marking = self.marking(pens, marks.len());
         marking.all(marks, [true; 2])?;
         marking.weave.rest_in_centre(lead_out_ticks(self.machine, self.lag_s));

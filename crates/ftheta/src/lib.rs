@@ -18,6 +18,7 @@ pub mod mechanism;
 pub mod output;
 pub mod pattern;
 mod planning;
+pub mod promise;
 pub mod results;
 pub mod verify;
 

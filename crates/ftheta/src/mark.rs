@@ -8,7 +8,7 @@ use ftheta_model::dose::DoseMap;
 use ftheta_model::job::Job;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Motion, PlanDraft, Planner};
-use ftheta_model::recipe::Recipe;
+use ftheta_model::recipe::{Pen, Recipe};
 use ftheta_model::toolpath::Toolpath;
 use ftheta_model::trace::{AxisStates, Trace};
 use ftheta_model::warning::{Imported, Warning};
@@ -191,6 +191,9 @@ pub(crate) fn lay_out(
 /// Stray energy from which on it is worth a warning.
 const STRAY_WARNING: f64 = 0.01;
 
+/// Part of a pen's speed below which a mark is called slower.
+const SLOWER_WARNING: f64 = 0.95;
+
 /// What a user has to know of a result before relying on it.
 fn shortcomings(plan: &PlanDraft, score: &Score) -> Vec<Warning> {
     let mut warnings = Vec::new();
@@ -203,11 +206,60 @@ fn shortcomings(plan: &PlanDraft, score: &Score) -> Vec<Warning> {
         let percent = score.stray_energy_ratio * 100.0;
         warn(format!("{percent:.1} % of the energy falls farther off its mark than the tolerance"));
     }
+    warnings.extend(slower_marks(plan));
+    let mut warn = |message: String| warnings.push(Warning::new("result", message));
     let dark = |index: usize| plan.marks.iter().any(|m| m.pen_index == index && m.power_w == 0.0);
     for (_, pen) in plan.pens.iter().enumerate().filter(|&(index, _)| dark(index)) {
         warn(format!("pen \"{}\" has no power, so its marks see no light", pen.name));
     }
     warnings
+}
+
+/// Marks that never reach their pen's speed, pen by pen; with a laser that is only on or off all
+/// that are slower anywhere, since their dose is not what the pen says.
+fn slower_marks(plan: &PlanDraft) -> Vec<Warning> {
+    let modulated = plan.machine.laser.power_modulated;
+    // Per pen: how many, the slowest of them and its speed.
+    let mut slower: Vec<(usize, usize, f64)> = vec![(0, 0, f64::INFINITY); plan.pens.len()];
+    let mut speeds: Vec<Option<f64>> = vec![None; plan.marks.len()];
+    for segment in &plan.segments {
+        let (Some(mark), Motion::Track { first_knot, n_knots, .. }) =
+            (segment.mark_index, segment.motion)
+        else {
+            continue;
+        };
+        let knots = &plan.knots[first_knot as usize..(first_knot + n_knots) as usize];
+        let speed = &mut speeds[mark as usize];
+        for knot in knots {
+            let reached = match (*speed, modulated) {
+                (None, _) => knot.speed_mm_s,
+                (Some(so_far), true) => so_far.max(knot.speed_mm_s),
+                (Some(so_far), false) => so_far.min(knot.speed_mm_s),
+            };
+            *speed = Some(reached);
+        }
+    }
+    for (index, (mark, speed)) in plan.marks.iter().zip(speeds).enumerate() {
+        let asked_mm_s = plan.pens[mark.pen_index].mark_speed_mm_s;
+        if let Some(speed) = speed.filter(|&speed| speed < SLOWER_WARNING * asked_mm_s) {
+            let (n_marks, slowest, slowest_mm_s) = &mut slower[mark.pen_index];
+            *n_marks += 1;
+            if speed < *slowest_mm_s {
+                (*slowest, *slowest_mm_s) = (index, speed);
+            }
+        }
+    }
+    let message = |(pen, (n_marks, slowest, speed)): (&Pen, (usize, usize, f64))| {
+        let dose = if modulated { "their power follows" } else { "their dose is higher" };
+        let text = format!(
+            "{n_marks} mark(s) of pen \"{}\" are slower than its {} mm/s, {dose}; slowest is mark \
+             {slowest} ({}) with {speed:.0} mm/s",
+            pen.name, pen.mark_speed_mm_s, plan.marks[slowest].source
+        );
+        Warning::new("speed", text)
+    };
+    let concerned = plan.pens.iter().zip(slower).filter(|(_, (n_marks, ..))| *n_marks > 0);
+    concerned.map(message).collect()
 }
 
 /// What the twin did with a plan.

@@ -34,6 +34,8 @@ pub struct Beam<'a> {
     /// Arc length where the beam should be by the way it has made, mm, and its last place.
     expected_mm: f64,
     last: Option<Point>,
+    /// Greatest distance of the lit beam from its mark so far, mm.
+    worst_mm: f64,
     /// Step of power that acts, and until when energy has been counted, ns.
     step: usize,
     counted_ns: f64,
@@ -55,11 +57,17 @@ impl<'a> Beam<'a> {
             given_mm: 0.0,
             expected_mm: 0.0,
             last: None,
+            worst_mm: 0.0,
             step: 0,
             counted_ns: 0.0,
         };
         beam.enter();
         beam
+    }
+
+    /// Greatest distance of the lit beam from its mark, mm, of a plan that promises one.
+    pub fn worst_mm(&self) -> Option<f64> {
+        self.strict.then_some(self.worst_mm)
     }
 
     /// Prepares for the mark that comes next.
@@ -129,6 +137,7 @@ impl<'a> Beam<'a> {
     ) -> Result<(), AuditError> {
         let place: Point = field_from_angles(&self.draft.machine.optics, angles).into();
         let (value, limit) = (self.nearest_mm(place), self.draft.tolerance_mm * (1.0 + ROUNDING));
+        self.worst_mm = self.worst_mm.max(value);
         if value.is_nan() || value > limit {
             let quantity = "distance of the lit beam from its mark";
             let place = format!("mark {} ({})", self.mark_index, mark.source);

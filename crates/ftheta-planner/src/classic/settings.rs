@@ -156,14 +156,18 @@ impl Settings {
 }
 
 /// Speed of the beam in the field's centre at the mirrors' greatest speed, whole mm/s.
-fn fastest_mm_s(machine: &Machine) -> f64 {
+pub(crate) fn fastest_mm_s(machine: &Machine) -> f64 {
     (machine.scanner.speed_max_rad_s * scale_mm_per_rad(&machine.optics)).floor()
 }
 
-/// Checks a pen's speed and power against the machine.
-pub(crate) fn check_pen(pen: &Pen, machine: &Machine) -> Result<(), PlanError> {
+/// Checks a pen's power against the machine, and its speed against a limit, mm/s.
+pub(crate) fn check_pen(
+    pen: &Pen,
+    machine: &Machine,
+    speed_max_mm_s: f64,
+) -> Result<(), PlanError> {
     let place = format!("pen \"{}\"", pen.name);
-    let range = (1e-3, fastest_mm_s(machine));
+    let range = (1e-3, speed_max_mm_s);
     check_range(&place, "mark_speed", pen.mark_speed_mm_s, range, "mm/s")?;
     check_range(&place, "power", pen.power_w, (0.0, machine.laser.power_max_w), "W")
 }

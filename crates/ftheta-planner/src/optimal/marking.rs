@@ -10,6 +10,7 @@ use crate::corner::Corners;
 use ftheta_model::plan::{Knot, PlannedMark};
 use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Mark;
+use ftheta_physics::audit::CORRECTION_RESERVE;
 use ftheta_physics::follow::TAPS_AFTER;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::scale_mm_per_rad;
@@ -27,6 +28,13 @@ const ALONG_SHARE: f64 = 0.35;
 const MARK_SHARE: f64 = 0.8;
 /// Corners sharper than this are stopped in, where the path is to be exact, rad.
 const STOP_RAD: f64 = 0.02;
+/// Where there is no room to come to a mark, it is tried slower, so often and by this much.
+const N_SLOWER: u32 = 8;
+const SLOWER: f64 = 0.5;
+/// Part of the voltage that the back-EMF of a mark may take.
+const COAST_SHARE: f64 = 0.25;
+/// Part of the mirrors' greatest speed that marks may have.
+const SPEED_SHARE: f64 = 0.9 * (1.0 - CORRECTION_RESERVE);
 /// How far a beam's nearest point is from where its speed profile says, in tolerances.
 const NEAR: f64 = 2.0;
 /// Least power, as a part of the pen's, so that light does not end before the mark does.
@@ -48,6 +56,26 @@ struct Piece {
     laid: Laid,
     /// Its speed as a part of what was asked for.
     part: f64,
+}
+
+/// A mark as it is made: stretches, and between each two a turn with its voltages.
+struct Stroke {
+    pieces: Vec<Piece>,
+    turns: Vec<Turn>,
+    joints: Vec<Vec<[f64; 2]>>,
+}
+
+impl Stroke {
+    /// Whether it is made at the pen's speed from end to end.
+    fn is_steady(&self, pen: &Pen) -> bool {
+        match &self.pieces[..] {
+            [piece] => match piece.stretch.knots[..] {
+                [knot] => knot.speed_mm_s == pen.mark_speed_mm_s,
+                _ => false,
+            },
+            _ => false,
+        }
+    }
 }
 
 /// Power from times on, s and W.
@@ -98,7 +126,8 @@ impl Marking<'_> {
         self.stroke(mark, path, &pen, &limits)
     }
 
-    /// A stretch of light without a break.
+    /// A stretch of light without a break; slower where the mirrors' angles leave no room to come
+    /// to it at its speed.
     fn stroke(
         &mut self,
         mark: Mark,
@@ -108,18 +137,43 @@ impl Marking<'_> {
     ) -> Result<(), PlanError> {
         let index = self.weave.draft.marks.len() as u32;
         let place = format!("mark {index} ({})", mark.source);
-        let mut turns = self.turns(&path, limits)?;
-        let (pieces, joints) = loop {
-            if let Some(pieces) = self.pieces(&path, &turns, limits, &place)? {
-                if let Some(joints) = self.joints(&pieces, &turns) {
-                    break (pieces, joints);
-                }
-                turns.clear();
+        let mut limits = *limits;
+        for _ in 0..N_SLOWER {
+            let stroke = self.laid(&path, &limits, &place)?;
+            if self.weave.fly_to(&stroke.pieces[0].laid)? {
+                return self.lit(mark, &path, pen, &stroke);
             }
-        };
-        if !self.weave.fly_to(&pieces[0].laid)? {
-            return Err(PlanError::NoRoom { place });
+            limits.speed_mm_s *= SLOWER;
         }
+        Err(PlanError::NoRoom { place })
+    }
+
+    /// Stretches and turns of a path, in the draft's tables.
+    fn laid(
+        &mut self,
+        path: &Path,
+        limits: &SpeedLimits,
+        place: &str,
+    ) -> Result<Stroke, PlanError> {
+        let turns = self.turns(path, limits)?;
+        let pieces = self.pieces(path, &turns, limits, place)?;
+        if let Some(joints) = self.joints(&pieces, &turns) {
+            return Ok(Stroke { pieces, turns, joints });
+        }
+        let pieces = self.pieces(path, &[], limits, place)?;
+        Ok(Stroke { pieces, turns: Vec::new(), joints: Vec::new() })
+    }
+
+    /// Follows a stroke from its beginning, where the mirrors are, with light.
+    fn lit(
+        &mut self,
+        mark: Mark,
+        path: &Path,
+        pen: &Pen,
+        stroke: &Stroke,
+    ) -> Result<(), PlanError> {
+        let Stroke { pieces, turns, joints } = stroke;
+        let index = self.weave.draft.marks.len() as u32;
         let start_s = self.weave.now_s();
         let mut end_s = start_s;
         let light_s = start_s + self.run_s[0];
@@ -129,7 +183,7 @@ impl Marking<'_> {
             let piece_s = self.weave.now_s();
             self.weave.follow(index, &piece.laid);
             let before = piece_index.checked_sub(1).and_then(|before| turns.get(before));
-            let offset_mm = before.map_or(0.0, |turn| corner_mm(turn));
+            let offset_mm = before.map_or(0.0, corner_mm);
             add_progress(&mut progress_mm, &self.progress_mm(piece), offset_mm);
             end_s = piece_s + time_at_s(&piece.stretch.knots, piece.stretch.path.length_mm());
             if let (Some(voltages), Some(turn)) = (joints.get(piece_index), turns.get(piece_index))
@@ -139,26 +193,22 @@ impl Marking<'_> {
                 add_progress(&mut progress_mm, &turn.progress_mm(parts), corner_mm(turn));
             }
         }
-        let steady = pieces.len() == 1 && pieces[0].stretch.knots.len() == 1;
         let laser = &self.weave.machine.laser;
-        let powers = match laser.power_modulated && !steady {
+        let powers = match laser.power_modulated && !stroke.is_steady(pen) {
             true => {
                 let times_s = (start_s, self.weave.period_s());
                 powers(pen, laser.power_max_w, &progress_mm, times_s)
             }
             false => Powers::new(),
         };
+        let first = powers.iter().take_while(|(time_s, _)| *time_s <= light_s).last();
         let planned = PlannedMark {
             curve: mark.curve,
             pen_index: mark.pen_index,
             source: mark.source,
             on_ns: 0,
             off_ns: 0,
-            power_w: powers
-                .iter()
-                .take_while(|(time_s, _)| *time_s <= light_s)
-                .last()
-                .map_or(pen.power_w, |&(_, power_w)| power_w),
+            power_w: first.map_or(pen.power_w, |&(_, power_w)| power_w),
             steps: Vec::new(),
         };
         self.weave.light(planned, [light_s, end_s], &powers)
@@ -212,14 +262,14 @@ impl Marking<'_> {
         candidates(path, limits.speed_mm_s, self.weave.smoothing, limit)
     }
 
-    /// The stretches between turns; `None` after taking out turns that have not the room.
+    /// The stretches between turns.
     fn pieces(
         &mut self,
         path: &Path,
         turns: &[Turn],
         limits: &SpeedLimits,
         place: &str,
-    ) -> Result<Option<Vec<Piece>>, PlanError> {
+    ) -> Result<Vec<Piece>, PlanError> {
         let mut pieces = Vec::with_capacity(turns.len() + 1);
         let last_vertex = path.vertices.len() - 1;
         for index in 0..=turns.len() {
@@ -261,7 +311,7 @@ impl Marking<'_> {
             let laid = self.weave.lay(&stretch)?;
             pieces.push(Piece { stretch, laid, part: factor.recip() });
         }
-        Ok(Some(pieces))
+        Ok(pieces)
     }
 
     /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
@@ -301,9 +351,12 @@ impl Marking<'_> {
         let scanner = &machine.scanner;
         let scale = scale_mm_per_rad(&machine.optics);
         let most = self.galvo.torque_constant / self.galvo.inertia() * scanner.current_max_a;
-        let speed_mm_s = pen.mark_speed_mm_s;
         let voltage_max_v =
             MARK_SHARE * (1.0 - self.options.voltage_reserve) * scanner.voltage_max_v;
+        // Coasting takes the back-EMF; the rest is left to come and go.
+        let coasting_rad_s = COAST_SHARE * voltage_max_v / self.galvo.torque_constant;
+        let fastest_rad_s = coasting_rad_s.min(SPEED_SHARE * scanner.speed_max_rad_s);
+        let speed_mm_s = pen.mark_speed_mm_s.min(fastest_rad_s * scale);
         let current_max_a = MARK_SHARE * scanner.current_max_a;
         SpeedLimits {
             speed_mm_s,
