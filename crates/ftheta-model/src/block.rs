@@ -9,8 +9,23 @@ pub struct Block {
     pub first_index: u64,
     /// One word pair per tick.
     pub words: Vec<DacCodes>,
+    /// What a driver that is sent voltages gets instead of words, one pair per tick; empty where
+    /// words are sent.
+    pub volts: Vec<[VoltageSample; 2]>,
     /// Laser edges whose time lies within this block, in order.
     pub edges: Vec<LaserEdge>,
+}
+
+/// A voltage with the state that the axis should be in: the driver adds what its servo makes of the
+/// difference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VoltageSample {
+    /// Voltage that acts from the next tick on, V.
+    pub next_v: f64,
+    /// Voltage that acts until then, as planned, V.
+    pub acting_v: f64,
+    /// State now, as planned: angle rad, speed rad/s, twist rad, its speed rad/s, current A.
+    pub state: [f64; 5],
 }
 
 /// A change of the laser's signal.

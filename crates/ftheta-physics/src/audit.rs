@@ -16,7 +16,7 @@ use crate::optics::{angles_from_field, scale_mm_per_rad};
 use crate::servo::{Gains, ServoError};
 use beam::Beam;
 use ftheta_model::machine::{Drive, Machine};
-use ftheta_model::plan::PlanDraft;
+use ftheta_model::plan::{Motion, PlanDraft};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use thiserror::Error;
 use walk::{Command, Walk};
@@ -27,8 +27,8 @@ use walk::{Command, Walk};
 pub const CORRECTION_RESERVE: f64 = 0.027;
 
 /// Commands that are computed from voltages lead the mirror, and may go so far, of the greatest
-/// angle: the mirror itself leaves [`CORRECTION_RESERVE`], and the table adds 2.7 % at the most.
-pub const COMMAND_SHARE: f64 = 0.99;
+/// angle; the mirror itself leaves [`CORRECTION_RESERVE`].
+pub const COMMAND_SHARE: f64 = 0.985;
 
 /// What is called so in messages.
 const DRIVER_VOLTAGE: &str = "driver voltage";
@@ -159,12 +159,16 @@ pub fn audit(draft: &PlanDraft) -> Result<Limits, AuditError> {
     let gains = Gains::design(scanner, tick_s)?;
     let invertible = gains.reference_rad(&State::zeros(), 0.0, 0.0).is_some();
     let inverse = Inverse::new(&galvo, &gains, tick_s);
-    structure::check_structure(draft, invertible && inverse.is_some())?;
-    light::check_light(draft, gains.lag_s(&galvo))?;
-    let mut walk = Walk::new(draft, gains, inverse.as_ref());
+    structure::check_structure(draft)?;
+    let by_voltage = invertible && draft.machine.output.drive != Drive::BlackBox;
+    if by_voltage && inverse.is_none() {
+        let what = "no voltage moves its mirrors".into();
+        return Err(AuditError::Malformed { place: "the machine".into(), what });
+    }
+    light::check_light(draft, gains.lag_s(&galvo), by_voltage)?;
+    let mut walk = Walk::new(draft, gains, inverse.as_ref(), by_voltage);
     let mut meter = Meter::new(draft, gains);
-    let known = invertible && draft.machine.output.drive != Drive::BlackBox;
-    let mut beam = Beam::new(draft, known);
+    let mut beam = Beam::new(draft, by_voltage);
     let period_ns = f64::from(draft.machine.output.period_ns);
     let gap_max_rad = draft.tolerance_mm / scale_mm_per_rad(&draft.machine.optics);
     while let Some((command, segment_index)) = walk.next() {
@@ -250,7 +254,12 @@ impl Meter {
             now.current = now.current.max(demand_a.abs() / scanner.current_max_a);
             now.heat = now.heat.max(*heat / (scanner.current_rms_a * scanner.current_rms_a));
         }
-        refuse(draft, commanded, &now, where_)?;
+        let computed = matches!(
+            draft.segments[segment_index].motion,
+            Motion::Track { .. } | Motion::Drive { .. }
+        );
+        let share = if computed { COMMAND_SHARE } else { 1.0 - CORRECTION_RESERVE };
+        refuse(draft, (commanded, share), &now, where_)?;
         self.n_samples += 1;
         self.limits.keep_peaks(&now);
         Ok(())
@@ -272,7 +281,7 @@ impl Limits {
 /// The error for the first quantity of a sample that is past its limit.
 fn refuse(
     draft: &PlanDraft,
-    commanded: f64,
+    (commanded, command_share): (f64, f64),
     now: &Limits,
     place: impl Fn() -> String,
 ) -> Result<(), AuditError> {
@@ -282,7 +291,7 @@ fn refuse(
     let word = commanded * scanner.angle_max_rad / word_range_rad;
     let rows = [
         (word, 1.0, "commanded angle (output word)", word_range_rad.to_degrees(), "deg"),
-        (commanded, free, "commanded angle", scanner.angle_max_rad.to_degrees(), "deg"),
+        (commanded, command_share, "commanded angle", scanner.angle_max_rad.to_degrees(), "deg"),
         (now.angle, 1.0, "mirror angle", scanner.angle_max_rad.to_degrees(), "deg"),
         (now.speed, free, "mirror speed", scanner.speed_max_rad_s, "rad/s"),
         (now.voltage, 1.0, DRIVER_VOLTAGE, scanner.voltage_max_v, "V"),

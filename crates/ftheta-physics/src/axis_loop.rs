@@ -3,6 +3,7 @@
 use crate::galvo::{CURRENT, Galvo, State, Step};
 use crate::lossy::LossyAxis;
 use crate::servo::{Gains, Memory, Seen};
+use ftheta_model::block::VoltageSample;
 use ftheta_model::machine::Scanner;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -67,13 +68,40 @@ impl AxisLoop {
     #[inline]
     pub fn tick(&mut self, reference_rad: f64, sensor_error_rad: f64) -> f64 {
         let acting_v = self.limited(self.pending_v);
-        let seen = Seen {
+        let seen = self.seen(acting_v, sensor_error_rad);
+        self.pending_v = self.gains.voltage(&mut self.memory, reference_rad, &seen, self.tick_s);
+        self.advance(acting_v)
+    }
+
+    /// Takes a planned voltage with the planned state, and moves on: the servo, which must be one of
+    /// state feedback, adds what it makes of the difference.
+    pub fn tick_beside(&mut self, planned: &VoltageSample, sensor_error_rad: f64) -> f64 {
+        let acting_v = self.limited(self.pending_v);
+        let answer_v =
+            |seen: &Seen| self.gains.voltage(&mut Memory::default(), 0.0, seen, self.tick_s);
+        let wanted = Seen {
+            state: State::from_row_slice(&planned.state),
+            sensor_rad: 0.0,
+            sensor_error_rad: 0.0,
+            voltage_v: planned.acting_v,
+        };
+        let seen = self.seen(acting_v, sensor_error_rad);
+        let next_v = planned.next_v + answer_v(&seen) - answer_v(&wanted);
+        self.pending_v = next_v;
+        self.advance(acting_v)
+    }
+
+    fn seen(&self, acting_v: f64, sensor_error_rad: f64) -> Seen {
+        Seen {
             state: self.state,
             sensor_rad: self.rotor_rad() + sensor_error_rad,
             sensor_error_rad,
             voltage_v: acting_v,
-        };
-        self.pending_v = self.gains.voltage(&mut self.memory, reference_rad, &seen, self.tick_s);
+        }
+    }
+
+    #[inline]
+    fn advance(&mut self, acting_v: f64) -> f64 {
         self.state = match &self.lossy {
             None => self.step.a * self.state + self.step.b * acting_v,
             Some(lossy) => lossy.advance(&self.state, acting_v),

@@ -6,7 +6,7 @@ mod words;
 
 use axes::Axes;
 use ftheta_model::block::{Block, LaserEdge};
-use ftheta_model::plan::{Motion, SpeedProfile};
+use ftheta_model::plan::{Motion, Planner, SpeedProfile};
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::space::DacCodes;
 use ftheta_physics::plan::Plan;
@@ -59,7 +59,7 @@ impl<'a> Renderer<'a> {
         let mut renderer = Self {
             plan,
             words,
-            axes: Axes::new(&plan.machine),
+            axes: Axes::new(&plan.machine, plan.planner == Planner::Optimal),
             segment_index: 0,
             n_rendered: 0,
             cursor: Cursor::at(&plan.vertices, 0),
@@ -110,6 +110,7 @@ impl<'a> Renderer<'a> {
             }
         }
         self.next_index += block.words.len() as u64;
+        self.axes.take_volts(&mut block.volts);
         self.push_edges(block);
         !block.words.is_empty()
     }
@@ -130,6 +131,7 @@ impl<'a> Renderer<'a> {
                 }
                 words.resize(words.len() + left, self.words.at(place));
                 self.axes.rest(self.words.exact(place));
+                self.axes.stay(left);
             }
             Motion::Drive { first: base } => {
                 let pairs = &self.plan.drives[(base + first - 1) as usize..(base + end) as usize];

@@ -1,6 +1,7 @@
 //! The two axes between ticks: exact states at sub-steps from one transition each.
 
 use crate::mismatch::Mismatch;
+use ftheta_model::block::VoltageSample;
 use ftheta_model::machine::{Machine, Sensor};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_model::trace::AxisStates;
@@ -16,6 +17,15 @@ use rand_xoshiro::rand_core::SeedableRng;
 
 /// Longest time between points of the trace, ns.
 const STEP_MAX_NS: u32 = 2000;
+
+/// What both axes are sent for a tick.
+#[derive(Clone, Copy)]
+pub enum Command<'a> {
+    /// Angles, rad.
+    Angles([f64; 2]),
+    /// Voltages with planned states.
+    Volts(&'a [VoltageSample; 2]),
+}
 
 /// Two axes, their sensors, and the optics behind them.
 #[derive(Clone)]
@@ -84,14 +94,17 @@ impl Beam {
         self.substeps.len()
     }
 
-    /// Plays one tick with these commanded angles, calls `visit` with the beam's place at each
-    /// sub-step after its start.
+    /// Plays one tick with these commands, calls `visit` with the beam's place at each sub-step
+    /// after its start.
     #[inline]
-    pub fn tick(&mut self, command: [f64; 2], mut visit: impl FnMut(FieldPoint)) {
+    pub fn tick(&mut self, command: Command<'_>, mut visit: impl FnMut(FieldPoint)) {
         let mut before = [*self.axes[0].state(), *self.axes[1].state()];
-        for (axis, &reference_rad) in command.iter().enumerate() {
+        for axis in 0..2 {
             let error_rad = self.sensor_error(axis);
-            self.voltages[axis] = self.axes[axis].tick(reference_rad, error_rad);
+            self.voltages[axis] = match command {
+                Command::Angles(angles_rad) => self.axes[axis].tick(angles_rad[axis], error_rad),
+                Command::Volts(samples) => self.axes[axis].tick_beside(&samples[axis], error_rad),
+            };
         }
         self.n_ticks += 1;
         for index in 0..self.substeps.len() {

@@ -1,6 +1,6 @@
 //! The twin: a sink for blocks that keeps what the beam did.
 
-use crate::beam::Beam;
+use crate::beam::{Beam, Command};
 use crate::exposure::Exposure;
 use crate::light::LaserState;
 use crate::mismatch::Mismatch;
@@ -132,8 +132,10 @@ impl SampleSink for Twin {
         block.edges.iter().for_each(|&edge| self.laser.take(edge));
         let mut places = [FieldPoint::default(); 100];
         let n_substeps = self.beam.n_substeps();
-        for word in &block.words {
-            let command = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
+        for (index, word) in block.words.iter().enumerate() {
+            let angles_rad = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
+            let command =
+                block.volts.get(index).map_or(Command::Angles(angles_rad), Command::Volts);
             let mut n_visited = 0;
             self.beam.tick(command, |place| {
                 places[n_visited] = place;

@@ -1,7 +1,6 @@
 //! Checks that light falls only while its mark is being made.
 
 use super::AuditError;
-use ftheta_model::machine::Drive;
 use ftheta_model::plan::{Motion, PlanDraft, PlannedMark};
 
 /// When the mirrors make a mark, ns.
@@ -19,9 +18,10 @@ struct Window {
 /// mirrors make them; settings of a classic controller may be wrong by one servo lag, never by more.
 ///
 /// * `lag_s`: the nominal servo's lag
-pub fn check_light(draft: &PlanDraft, lag_s: f64) -> Result<(), AuditError> {
+/// * `by_voltage`: whether commands of tracks and drives are computed from voltages
+pub fn check_light(draft: &PlanDraft, lag_s: f64, by_voltage: bool) -> Result<(), AuditError> {
     let laser = &draft.machine.laser;
-    let windows = mark_windows(draft, (lag_s * 1e9) as i64)?;
+    let windows = mark_windows(draft, (lag_s * 1e9) as i64, by_voltage)?;
     let end_ns = draft.n_samples() * u64::from(draft.machine.output.period_ns);
     let mut last_off_ns = 0;
     for (index, (mark, window)) in draft.marks.iter().zip(windows).enumerate() {
@@ -75,14 +75,17 @@ fn check_power(
 
 /// When the mirrors make each mark: what is computed from voltages begins a tick after its first
 /// sample, other motion a tick before it, and the mirrors follow it by the lag.
-fn mark_windows(draft: &PlanDraft, lag_ns: i64) -> Result<Vec<Window>, AuditError> {
+fn mark_windows(
+    draft: &PlanDraft,
+    lag_ns: i64,
+    by_voltage: bool,
+) -> Result<Vec<Window>, AuditError> {
     let period_ns = i64::from(draft.machine.output.period_ns);
-    let black_box = draft.machine.output.drive == Drive::BlackBox;
     let mut windows: Vec<Window> = Vec::with_capacity(draft.marks.len());
     let mut n_samples = 0_i64;
     for (index, segment) in draft.segments.iter().enumerate() {
         let computed = matches!(segment.motion, Motion::Track { .. } | Motion::Drive { .. });
-        let after_ns = match computed && !black_box {
+        let after_ns = match computed && by_voltage {
             true => period_ns,
             false => lag_ns - period_ns,
         };

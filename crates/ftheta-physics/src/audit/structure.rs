@@ -1,7 +1,6 @@
 //! Checks that the parts of a plan fit together, before anything is made of them.
 
 use super::AuditError;
-use ftheta_model::machine::Drive;
 use ftheta_model::plan::{Motion, PlanDraft, Segment};
 use ftheta_model::recipe::Interpolation;
 use kurbo::Point;
@@ -10,9 +9,7 @@ use kurbo::Point;
 const SMOOTHING_TICKS_MAX: u32 = 1000;
 
 /// Checks that indices exist, numbers are finite and segments join end to end from the centre.
-///
-/// * `inverse`: whether the servo's commands can be computed from voltages
-pub fn check_structure(draft: &PlanDraft, inverse: bool) -> Result<(), AuditError> {
+pub fn check_structure(draft: &PlanDraft) -> Result<(), AuditError> {
     let malformed = |place: String, what: &str| AuditError::Malformed { place, what: what.into() };
     if draft.segments.is_empty() {
         return Err(malformed("the plan".into(), "no segments"));
@@ -31,7 +28,7 @@ pub fn check_structure(draft: &PlanDraft, inverse: bool) -> Result<(), AuditErro
         if segment.mark_index.is_some_and(|mark| mark as usize >= draft.marks.len()) {
             return Err(malformed(place(), "its mark does not exist"));
         }
-        check_segment(draft, segment, inverse).map_err(|what| malformed(place(), what))?;
+        check_segment(draft, segment).map_err(|what| malformed(place(), what))?;
         let ends = segment.motion.ends();
         let follows_on = match (&segment.motion, ends, at) {
             (Motion::Hold { .. } | Motion::Travel { .. }, Some((first, _)), Some(at)) => {
@@ -84,7 +81,7 @@ fn check_numbers(draft: &PlanDraft) -> Result<(), AuditError> {
     }
 }
 
-fn check_segment(draft: &PlanDraft, segment: &Segment, inverse: bool) -> Result<(), &'static str> {
+fn check_segment(draft: &PlanDraft, segment: &Segment) -> Result<(), &'static str> {
     let motion = &segment.motion;
     if motion.ends().is_some_and(|(_, last)| last >= draft.vertices.len()) {
         return Err("its vertices do not exist");
@@ -100,12 +97,7 @@ fn check_segment(draft: &PlanDraft, segment: &Segment, inverse: bool) -> Result<
             }
             Ok(())
         }
-    }?;
-    let computed = matches!(motion, Motion::Track { .. } | Motion::Drive { .. });
-    if computed && !inverse && draft.machine.output.drive != Drive::BlackBox {
-        return Err("the memory of the servo outlasts what it is driven by");
     }
-    Ok(())
 }
 
 /// Checks a travel's speed profile against its vertices: `render` trusts the length.

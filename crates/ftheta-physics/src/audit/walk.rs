@@ -5,7 +5,6 @@ use crate::follow::{Inverse, Taps, dot};
 use crate::galvo::{Galvo, State, Step};
 use crate::optics::angles_from_field;
 use crate::servo::{Gains, Memory, Seen};
-use ftheta_model::machine::Drive;
 use ftheta_model::plan::{Motion, PlanDraft};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use kurbo::Point;
@@ -48,10 +47,15 @@ impl<'a> Walk<'a> {
     /// Starts at the first sample.
     ///
     /// * `inverse`: that of the nominal axis, which plans with tracks need
-    pub fn new(draft: &'a PlanDraft, gains: Gains, inverse: Option<&'a Inverse>) -> Self {
+    /// * `by_voltage`: whether commands of tracks and drives are computed from voltages
+    pub fn new(
+        draft: &'a PlanDraft,
+        gains: Gains,
+        inverse: Option<&'a Inverse>,
+        by_voltage: bool,
+    ) -> Self {
         let tick_s = draft.machine.output.period_s();
         let galvo = Galvo::new(&draft.machine.scanner);
-        let known = gains.reference_rad(&State::zeros(), 0.0, 0.0).is_some();
         let mut walk = Self {
             draft,
             gains,
@@ -59,7 +63,7 @@ impl<'a> Walk<'a> {
             mirror_row: galvo.mirror_row(),
             inverse,
             tick_s,
-            by_voltage: known && draft.machine.output.drive != Drive::BlackBox,
+            by_voltage,
             segment_index: 0,
             n_given: 0,
             leg: 0,

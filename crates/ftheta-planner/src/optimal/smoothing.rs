@@ -11,7 +11,7 @@ const LAG_SHARE: f64 = 0.25;
 
 /// Spread of a servo's answer in time, as a part of its lag: two equal poles have 0.71, state
 /// feedback 0.43.
-const SERVO_SHARE: f64 = 0.5;
+const SERVO_SHARE: f64 = 0.65;
 /// Mean of a bell's distance from its middle, as a part of its spread.
 const MEAN_SHARE: f64 = 0.8;
 

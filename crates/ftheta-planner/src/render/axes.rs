@@ -1,6 +1,7 @@
 //! Both axes as the plan has them move, where commands are computed from voltages.
 
 use super::track::{references, state};
+use ftheta_model::block::VoltageSample;
 use ftheta_model::machine::{Drive, Machine};
 use ftheta_physics::follow::{Inverse, N_TAPS, TAPS_BEFORE, Taps};
 use ftheta_physics::galvo::{Galvo, State, Step};
@@ -16,6 +17,8 @@ pub(super) struct Axes {
     /// State a tick later, where a track has just ended: what follows goes on from there, since a
     /// path that bends sharply at its end is followed only nearly.
     later: Option<[State; 2]>,
+    /// What a driver that is sent voltages gets, sample by sample; nothing on other drives.
+    volts: Option<Vec<[VoltageSample; 2]>>,
 }
 
 #[derive(Clone)]
@@ -27,12 +30,30 @@ struct Model {
 }
 
 impl Axes {
-    pub(super) fn new(machine: &Machine) -> Self {
+    /// * `planned`: whether all motion is computed from voltages
+    pub(super) fn new(machine: &Machine, planned: bool) -> Self {
         let model = match machine.output.drive {
             Drive::BlackBox => None,
             Drive::ServoKnown | Drive::Voltage => Model::new(machine),
         };
-        Self { model, now: None, later: None }
+        let by_volts = planned && model.is_some() && machine.output.drive == Drive::Voltage;
+        Self { model, now: None, later: None, volts: by_volts.then(Vec::new) }
+    }
+
+    /// Takes the samples since the last call for a driver that is sent voltages.
+    pub(super) fn take_volts(&mut self, volts: &mut Vec<[VoltageSample; 2]>) {
+        volts.clear();
+        if let Some(kept) = &mut self.volts {
+            std::mem::swap(kept, volts);
+        }
+    }
+
+    /// So many samples at rest.
+    pub(super) fn stay(&mut self, n_samples: usize) {
+        if let (Some(volts), Some(now)) = (&mut self.volts, &self.now) {
+            let rest = now.map(|(state, acting_v)| sample(&state, acting_v, 0.0));
+            volts.resize(volts.len() + n_samples, rest);
+        }
     }
 
     /// The axes rest at these angles.
@@ -60,6 +81,10 @@ impl Axes {
         };
         let mut angles_rad = next;
         let later = self.later.take();
+        if let Some(volts) = &mut self.volts {
+            let at = |axis: usize| sample(&now[axis].0, now[axis].1, next[axis]);
+            volts.push([at(0), at(1)]);
+        }
         for (axis, (state, acting_v)) in now.iter_mut().enumerate() {
             let next_v = next[axis];
             let reference_rad = model.gains.reference_rad(state, *acting_v, next_v);
@@ -85,7 +110,7 @@ impl Axes {
         (first, last): (bool, bool),
         mut push: impl FnMut([f64; 2]),
     ) {
-        let Some(model) = &self.model else {
+        let Some(model) = self.model.as_ref() else {
             let [x_rad, y_rad] = angles_rad.map(|angles| &angles[TAPS_BEFORE + 2..]);
             x_rad.iter().zip(y_rad).take(n_samples).for_each(|(&x, &y)| push([x, y]));
             return;
@@ -101,9 +126,22 @@ impl Axes {
             push(self.drive(voltages_v));
         }
         references(&reference, left).for_each(push);
+        if let (Some(volts), Some(model)) = (&mut self.volts, &self.model) {
+            volts.extend((n_joints..n_samples).map(|index| {
+                let (now, next) = (
+                    state(&model.inverse, angles_rad, index),
+                    state(&model.inverse, angles_rad, index + 1),
+                );
+                [0, 1].map(|axis| sample(&now[axis].0, now[axis].1, next[axis].1))
+            }));
+        }
         self.now = end;
         self.later = after.map(|axes| axes.map(|(state, _)| state));
     }
+}
+
+fn sample(state: &State, acting_v: f64, next_v: f64) -> VoltageSample {
+    VoltageSample { next_v, acting_v, state: (*state).into() }
 }
 
 impl Model {
