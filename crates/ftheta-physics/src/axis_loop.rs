@@ -77,9 +77,8 @@ impl AxisLoop {
     /// state feedback, adds what it makes of the difference.
     pub fn tick_beside(&mut self, planned: &VoltageSample, sensor_error_rad: f64) -> f64 {
         let acting_v = self.limited(self.pending_v);
-        let answer_v = |seen: &Seen| {
-            self.gains.voltage(&mut Memory::default(), 0.0, seen, self.tick_s)
-        };
+        let answer_v =
+            |seen: &Seen| self.gains.voltage(&mut Memory::default(), 0.0, seen, self.tick_s);
         let wanted = Seen {
             state: State::from_row_slice(&planned.state),
             sensor_rad: 0.0,

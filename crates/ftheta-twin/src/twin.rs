@@ -134,7 +134,8 @@ impl SampleSink for Twin {
         let n_substeps = self.beam.n_substeps();
         for (index, word) in block.words.iter().enumerate() {
             let angles_rad = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
-            let command = block.volts.get(index).map_or(Command::Angles(angles_rad), Command::Volts);
+            let command =
+                block.volts.get(index).map_or(Command::Angles(angles_rad), Command::Volts);
             let mut n_visited = 0;
             self.beam.tick(command, |place| {
                 places[n_visited] = place;

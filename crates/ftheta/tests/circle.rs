@@ -49,6 +49,16 @@ fn circles_are_round_and_uniform() {
     }
 }
 
+/// A driver that is sent voltages does not see the words' steps.
+#[test]
+fn voltages_are_finer_than_words() {
+    let mut machine = machine("S10-f160", 16);
+    machine.output.drive = Drive::Voltage;
+    let roundness = turn(&machine, &at_centre([0.5, 0.5], 2000.0)).roundness;
+    let [low, high] = roundness.speed_ratio;
+    assert!(roundness.error_max_mm <= 1e-5 && 0.999 <= low && high <= 1.001, "{roundness:?}");
+}
+
 #[test]
 fn a_fast_ellipse_is_uniform() {
     let shape = at_centre([0.5, 0.25], 1.0);

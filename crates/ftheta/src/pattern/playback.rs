@@ -64,6 +64,7 @@ pub(super) fn playback(
         volts: Vec::new(),
         first_index: 0,
         words: (0..n_samples).map(|sample| words[at(sample)]).collect(),
+        volts: Vec::new(),
         edges: edges(&points, &machine.laser, rate, lag_s)
             .map(|(time_ns, lit)| LaserEdge { time_ns, power_w: if lit { power_w } else { 0.0 } })
             .collect(),
