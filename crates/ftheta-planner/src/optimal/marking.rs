@@ -13,6 +13,7 @@ use ftheta_model::toolpath::Mark;
 use ftheta_physics::follow::TAPS_AFTER;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::scale_mm_per_rad;
+use std::borrow::Cow;
 
 /// Part of the tolerance by which a plan itself may miss a curve; the rest is for the machine.
 const MISS_SHARE: f64 = 0.85;
@@ -43,8 +44,8 @@ pub(super) struct Marking<'a> {
 }
 
 /// A stretch between two turns, and the turn after it.
-struct Piece {
-    stretch: Stretch,
+struct Piece<'a> {
+    stretch: Stretch<'a>,
     laid: Laid,
     /// Its speed as a part of what was asked for.
     part: f64,
@@ -213,13 +214,13 @@ impl Marking<'_> {
     }
 
     /// The stretches between turns; `None` after taking out turns that have not the room.
-    fn pieces(
+    fn pieces<'p>(
         &mut self,
-        path: &Path,
+        path: &'p Path,
         turns: &[Turn],
         limits: &SpeedLimits,
         place: &str,
-    ) -> Result<Option<Vec<Piece>>, PlanError> {
+    ) -> Result<Option<Vec<Piece<'p>>>, PlanError> {
         let mut pieces = Vec::with_capacity(turns.len() + 1);
         let last_vertex = path.vertices.len() - 1;
         for index in 0..=turns.len() {
@@ -227,7 +228,10 @@ impl Marking<'_> {
             let after = turns.get(index);
             let from = before.map_or(0, |turn| turn.vertex);
             let to = after.map_or(last_vertex, |turn| turn.vertex);
-            let path = path.part(from, to);
+            let path = match turns.is_empty() {
+                true => Cow::Borrowed(path),
+                false => Cow::Owned(path.part(from, to)),
+            };
             let knots = profile(&path, limits, self.weave.smoothing);
             let whole_s = time_at_s(&knots, path.length_mm());
             let starts_s = before.map_or(-self.run_s[0], |turn| turn.runs_s()[1]);
@@ -266,7 +270,7 @@ impl Marking<'_> {
 
     /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
     /// than the motors stand.
-    fn joints(&self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
+    fn joints(&self, pieces: &[Piece<'_>], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
         let mut joints = Vec::with_capacity(turns.len());
         for (turn, pair) in turns.iter().zip(pieces.windows(2)) {
             let voltages = turn.voltages_v([pair[0].part, pair[1].part]);
@@ -282,7 +286,7 @@ impl Marking<'_> {
 
     /// Progress of the beam along the path at every tick of a stretch, from the first to the end,
     /// mm.
-    fn progress_mm(&self, piece: &Piece) -> Vec<f64> {
+    fn progress_mm(&self, piece: &Piece<'_>) -> Vec<f64> {
         let Stretch { knots, path, .. } = &piece.stretch;
         let n_ticks = piece.laid.n_ticks();
         if let [knot] = knots[..] {
