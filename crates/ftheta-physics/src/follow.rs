@@ -56,9 +56,10 @@ impl Inverse {
         let powers: Vec<(State, f64, f64)> =
             (0..N_TAPS).map(|degree| at_power(&bordered, degree)).collect();
         let taps = |value: &dyn Fn(&(State, f64, f64)) -> f64| {
-            let scaled = powers.iter().enumerate().map(|(degree, answer)| {
-                value(answer) / (TAPS_AFTER as f64).powi(degree as i32)
-            });
+            let scaled = powers
+                .iter()
+                .enumerate()
+                .map(|(degree, answer)| value(answer) / (TAPS_AFTER as f64).powi(degree as i32));
             let weights = nodes.solve(&DVector::from_iterator(N_TAPS, scaled))?;
             weights.as_slice().try_into().ok()
         };

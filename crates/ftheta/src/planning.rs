@@ -85,8 +85,7 @@ impl Planning<'_> {
             let optimal = self.optimal(restraint, voltage_reserve);
             let gains = Gains::design(&machine.scanner, machine.output.period_s())?;
             let scanner = transitions.atlas().scanner().clone();
-            let corners =
-                Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
+            let corners = Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
             let motions = Motions::Known { transitions: &transitions, corners: &corners };
             let planner = OptimalPlanner::new(machine, motions, optimal)?;
             options.atlas_store.restore(&transitions, &corners, warnings);
@@ -121,9 +120,7 @@ impl Planning<'_> {
         let Self { machine, options, .. } = *self;
         let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
         let axis = AxisOptions {
-            model: Model::Held {
-                epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD),
-            },
+            model: Model::Held { epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD) },
             tick_s: machine.output.period_s(),
             voltage_reserve: 1.0 - (1.0 - options.reserve) * (1.0 - restraint.voltage_reserve),
             current_bound: CurrentBound::Always,

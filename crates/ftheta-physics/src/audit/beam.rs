@@ -70,13 +70,15 @@ impl<'a> Beam<'a> {
             return;
         };
         let mut points: Vec<Point> = Vec::new();
-        kurbo::flatten(&mark.curve, FLATTEN_SHARE * self.draft.tolerance_mm, |element| {
-            match element {
+        kurbo::flatten(
+            &mark.curve,
+            FLATTEN_SHARE * self.draft.tolerance_mm,
+            |element| match element {
                 PathEl::MoveTo(point) | PathEl::LineTo(point) => points.push(point),
                 PathEl::ClosePath => points.extend(points.first().copied()),
                 PathEl::QuadTo(..) | PathEl::CurveTo(..) => {}
-            }
-        });
+            },
+        );
         let mut length_mm = 0.0;
         self.lengths_mm.clear();
         for (index, point) in points.iter().enumerate() {

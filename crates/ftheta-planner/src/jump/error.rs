@@ -53,9 +53,7 @@ impl JumpError {
             Self::Unsolved { n_ticks, status, .. } => {
                 (format!("jump of {n_ticks} ticks"), status.clone(), "a solution".into())
             }
-            Self::NoServo => {
-                ("scanner.servo".into(), "unknown".into(), "state feedback".into())
-            }
+            Self::NoServo => ("scanner.servo".into(), "unknown".into(), "state feedback".into()),
             Self::TooLong { step_rad, limit, .. } => {
                 ("jump".into(), format!("{step_rad} rad"), format!("{limit} ticks"))
             }

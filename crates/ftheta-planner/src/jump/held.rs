@@ -96,7 +96,12 @@ impl Held {
     }
 
     /// The difference a tick later.
-    pub(super) fn advance(&self, deviation: &Deviation, state: &State, voltage_v: f64) -> Deviation {
+    pub(super) fn advance(
+        &self,
+        deviation: &Deviation,
+        state: &State,
+        voltage_v: f64,
+    ) -> Deviation {
         self.motion * deviation + self.from_state * state + self.from_voltage * voltage_v
     }
 }

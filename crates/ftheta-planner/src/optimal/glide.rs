@@ -62,9 +62,7 @@ impl Glide {
             let duration_s = n_ticks * self.tick_s;
             let laws = [0, 1].map(|axis| self.law(&from[axis], &to[axis], duration_s));
             if laws.iter().all(|law| self.allows(law)) {
-                let angles = |tick: usize| {
-                    laws.map(|law| law.at((tick + 1) as f64 / n_ticks).0)
-                };
+                let angles = |tick: usize| laws.map(|law| law.at((tick + 1) as f64 / n_ticks).0);
                 return Some((0..n_ticks as usize).map(angles).collect());
             }
             n_ticks = (n_ticks * LONGER).ceil();

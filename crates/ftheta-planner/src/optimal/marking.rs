@@ -189,8 +189,8 @@ impl Marking<'_> {
             let (before_mm, after_mm) = (runs_mm[0] + margin_mm, runs_mm[1] + margin_mm);
             let room_mm = match turns.last() {
                 Some(last) => {
-                    let way_mm = path.stations[vertex].distance_mm
-                        - path.stations[last.vertex].distance_mm;
+                    let way_mm =
+                        path.stations[vertex].distance_mm - path.stations[last.vertex].distance_mm;
                     way_mm - speed * (last.runs_s()[1] + 2.0 * self.weave.period_s())
                 }
                 None => path.stations[vertex].distance_mm,

@@ -93,12 +93,7 @@ impl Path {
     /// Arc lengths of the points nearest to places, each looked for near an arc length, mm.
     ///
     /// * `near_mm`: how near, so that a path that comes back to the place is not mistaken
-    pub(super) fn nearest_mm(
-        &self,
-        places: &[Point],
-        around_mm: &[f64],
-        near_mm: f64,
-    ) -> Vec<f64> {
+    pub(super) fn nearest_mm(&self, places: &[Point], around_mm: &[f64], near_mm: f64) -> Vec<f64> {
         let n_legs = self.vertices.len() - 1;
         let mut first = 0;
         let nearest = |(place, middle_mm): (&Point, &f64)| {

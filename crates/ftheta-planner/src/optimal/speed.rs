@@ -173,14 +173,15 @@ fn alone(turns: &[Turn], index: usize, reach_mm: f64) -> bool {
 fn weighed(turns: &[Turn], index: usize, reach_mm: f64) -> (f64, f64) {
     let at_mm = turns[index].at_mm;
     let (mut missed, mut turned) = (turns[index].angle_rad, turns[index].angle_rad);
+    let per_mm = reach_mm.recip();
     let mut add = |turn: &Turn| {
-        let off = (turn.at_mm - at_mm).abs() / reach_mm;
-        if off >= 1.0 {
+        let near = 1.0 - (turn.at_mm - at_mm).abs() * per_mm;
+        if near <= 0.0 {
             return false;
         }
         // What three averages make of a turn beside the middle, within a few hundredths.
-        missed += turn.angle_rad * (1.0 - off).powi(3);
-        turned += turn.angle_rad * (1.0 - off);
+        missed += turn.angle_rad * (near * near * near);
+        turned += turn.angle_rad * near;
         true
     };
     for turn in turns[..index].iter().rev() {
@@ -197,7 +198,12 @@ fn weighed(turns: &[Turn], index: usize, reach_mm: f64) -> (f64, f64) {
 }
 
 /// Knots under limits at places, with one acceleration up and down.
-fn knots(length_mm: f64, mut slow: Vec<Limit>, most_mm_s: f64, acceleration_mm_s2: f64) -> Vec<Knot> {
+fn knots(
+    length_mm: f64,
+    mut slow: Vec<Limit>,
+    most_mm_s: f64,
+    acceleration_mm_s2: f64,
+) -> Vec<Knot> {
     let steady = Knot { time_s: 0.0, distance_mm: 0.0, speed_mm_s: most_mm_s };
     if slow.is_empty() {
         return vec![steady];
@@ -239,13 +245,7 @@ fn spread(slow: &mut [Limit], acceleration_mm_s2: f64) {
 }
 
 /// Up, along, and down between two limits; then waits.
-fn leg(
-    knots: &mut Vec<Knot>,
-    from: Limit,
-    to: Limit,
-    most_mm_s: f64,
-    acceleration_mm_s2: f64,
-) {
+fn leg(knots: &mut Vec<Knot>, from: Limit, to: Limit, most_mm_s: f64, acceleration_mm_s2: f64) {
     let room_mm = to.at_mm - from.at_mm;
     let (u, v) = (from.speed_mm_s, to.speed_mm_s.min(most_mm_s));
     let last = to.speed_mm_s == f64::INFINITY;
@@ -256,7 +256,8 @@ fn leg(
         (0.5 * (u * u + v * v) + a * room_mm).sqrt().min(most_mm_s)
     };
     let end = if last { peak } else { v };
-    let (up_mm, down_mm) = ((peak * peak - u * u) / (2.0 * a), (peak * peak - end * end) / (2.0 * a));
+    let (up_mm, down_mm) =
+        ((peak * peak - u * u) / (2.0 * a), (peak * peak - end * end) / (2.0 * a));
     let mut push = |distance_mm: f64, speed_mm_s: f64, duration_s: f64| {
         let before = knots[knots.len() - 1];
         if duration_s > 1e-12 {
@@ -280,9 +281,9 @@ pub(super) fn time_at_s(knots: &[Knot], distance_mm: f64) -> f64 {
     let index = knots.partition_point(|knot| knot.distance_mm < distance_mm).max(1) - 1;
     let from = knots[index];
     let gap_mm = distance_mm - from.distance_mm;
-    let acceleration = knots.get(index + 1).map_or(0.0, |to| {
-        (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s)
-    });
+    let acceleration = knots
+        .get(index + 1)
+        .map_or(0.0, |to| (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s));
     let speed = (from.speed_mm_s.powi(2) + 2.0 * acceleration * gap_mm).max(0.0).sqrt();
     // Both roots alike: neither a small acceleration nor a small speed is divided by.
     from.time_s + 2.0 * gap_mm / (from.speed_mm_s + speed)

@@ -70,8 +70,8 @@ impl Turn {
         let theta = angle(station.arriving, station.leaving).abs();
         // Past a right angle the nearest point of the other leg is the corner.
         let sine = if theta < std::f64::consts::FRAC_PI_2 { theta.sin() } else { 1.0 };
-        let band_mm = (allowance.contour_mm / sine)
-            .min(allowance.coverage_mm / (2.0 * (0.5 * theta).sin()));
+        let band_mm =
+            (allowance.contour_mm / sine).min(allowance.coverage_mm / (2.0 * (0.5 * theta).sin()));
         let mut sides = Vec::with_capacity(2);
         for (end, direction) in [(End::Arrive, station.arriving), (End::Depart, station.leaving)] {
             let (unit, mm_per_rad) = mirror_direction(machine, at, direction)?;
@@ -216,8 +216,7 @@ pub(super) fn candidates(
 pub(super) fn straight_mm(path: &Path, vertex: usize, forwards: bool, enough_mm: f64) -> f64 {
     let stations = &path.stations;
     let at_mm = stations[vertex].distance_mm;
-    let direction =
-        if forwards { stations[vertex].leaving } else { stations[vertex].arriving };
+    let direction = if forwards { stations[vertex].leaving } else { stations[vertex].arriving };
     let mut here = vertex;
     loop {
         let way_mm = (stations[here].distance_mm - at_mm).abs();

@@ -68,7 +68,8 @@ impl Axes {
                 None => model.step.a * *state + model.step.b * *acting_v,
             };
             *acting_v = next_v;
-            angles_rad[axis] = reference_rad.expect("a model is only made of a servo that has a reference");
+            angles_rad[axis] =
+                reference_rad.expect("a model is only made of a servo that has a reference");
         }
         angles_rad
     }
