@@ -43,6 +43,14 @@ pub fn marked(
         .sum();
     let mut plan = plan(&marked.plan, &marked.times);
     plan["planning_s"] = json!(planning_s);
+    if let Some(promise) = &marked.promise {
+        plan["promise"] = json!({
+            "contour_error_um": promise.contour_mm() * 1e3,
+            "planned_um": promise.planned_mm * 1e3,
+            "f1_um": promise.f1_mm * 1e3,
+            "kt_um": promise.kt_mm * 1e3,
+        });
+    }
     json!({
         "plan": plan,
         "limits": limits(marked.plan.limits()),

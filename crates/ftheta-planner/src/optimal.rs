@@ -223,8 +223,7 @@ impl<'a> OptimalPlanner<'a> {
             segments: Vec::new(),
         };
         let heat = Heat::new(machine, self.options.restraint.heat_share);
-        let weave =
-            Weave::new(machine, &self.inverse, &self.smoothing, &self.mover, heat, draft);
+        let weave = Weave::new(machine, &self.inverse, &self.smoothing, &self.mover, heat, draft);
         let run_s = RUN_LAGS.map(|lags| if corners.is_some() { 0.0 } else { lags * lag_s });
         Marking { weave, options: &self.options, corners, galvo: self.galvo, run_s }
     }

@@ -41,6 +41,28 @@ fn random_routes_are_planned_within_limits() {
     assert!(tally.n_refused[0] > 150 && tally.n_refused[1] <= 10, "{tally:?}");
 }
 
+/// In whatever order rays are solved, and whichever of them have been kept.
+#[test]
+fn transitions_are_the_same_whatever_is_solved_before() {
+    let transitions = || Transitions::new(&scanner("S10"), options(Model::Flexible)).unwrap();
+    let [first, backwards, restored] = [transitions(), transitions(), transitions()];
+    let routes = [(0.02, 40.0, -10.0), (0.004, -6.0, 6.0), (-0.01, 20.0, 30.0)].map(
+        |(to_rad, from_rad_s, to_rad_s)| Route { from_rad: 0.0, to_rad, from_rad_s, to_rad_s },
+    );
+    let plan = |transitions: &Transitions, route: &Route| {
+        transitions.plan(route).unwrap().unwrap().voltages_v().collect::<Vec<_>>()
+    };
+    let planned: Vec<_> = routes.iter().map(|route| plan(&first, route)).collect();
+    let half: Vec<_> = first.solved().into_iter().step_by(2).collect();
+    assert!(!half.is_empty());
+    restored.restore(&half.into_iter().collect());
+    for (route, voltages_v) in routes.iter().zip(&planned).rev() {
+        assert_eq!(&plan(&backwards, route), voltages_v);
+        assert_eq!(&plan(&restored, route), voltages_v);
+    }
+    assert_eq!(backwards.solved(), first.solved());
+}
+
 #[test]
 fn one_number_of_ticks_before_a_wall_is_found() {
     let scanner = scanner("S14");

@@ -65,7 +65,7 @@ static SOLVER: LazyLock<Solver> = LazyLock::new(|| {
         current_bound: CurrentBound::Always,
     };
     let mut atlas = Atlas::restore(&machine.scanner, axis, Default::default()).unwrap();
-    let jobs = [text_job(), dense_curve(), spiral(10)];
+    let jobs = [text_job(), dense_curve(), spiral(10, 0.005)];
     let longest_rad = jobs.iter().map(|job| longest_step_rad(job, &machine)).fold(0.0, f64::max);
     atlas.extend(0, longest_rad).unwrap();
     let gains = Gains::design(&machine.scanner, axis.tick_s).unwrap();
@@ -106,12 +106,12 @@ fn dense_curve() -> Toolpath {
     polyline((0..=8000).map(|index| at(TAU * f64::from(index) / 8000.0)))
 }
 
-/// Chords of 5 µm along circles whose radius grows.
-fn spiral(n_segments: u32) -> Toolpath {
+/// Chords along circles whose radius grows.
+fn spiral(n_segments: u32, chord_mm: f64) -> Toolpath {
     let mut turn = 0.0;
     let points = (0..=n_segments).map(|_| {
         let radius_mm = 20.0 + turn / TAU;
-        turn += 0.005 / radius_mm;
+        turn += chord_mm / radius_mm;
         Point::new(radius_mm * f64::cos(turn), radius_mm * f64::sin(turn))
     });
     polyline(points)
@@ -152,7 +152,7 @@ fn dense_curve_planned(bencher: Bencher) {
 
 #[divan::bench(args = [1_000, 10_000, 100_000, 1_000_000])]
 fn segments_of_5_um(bencher: Bencher, n_segments: u32) {
-    plan(bencher, spiral(n_segments), n_segments as usize);
+    plan(bencher, spiral(n_segments, 0.005), n_segments as usize);
 }
 
 /// What is prepared once for all jobs.
@@ -161,13 +161,15 @@ fn preparation(bencher: Bencher) {
     bencher.bench_local(prepared);
 }
 
-fn tracks() -> Plan {
-    Plan::new(prepared().draft(spiral(40_000)).unwrap()).unwrap()
+/// 200 mm of track.
+fn tracks(chord_um: u32) -> Plan {
+    let spiral = spiral(200_000 / chord_um, 1e-3 * f64::from(chord_um));
+    Plan::new(prepared().draft(spiral).unwrap()).unwrap()
 }
 
-#[divan::bench]
-fn render_tracks(bencher: Bencher) {
-    let plan = tracks();
+#[divan::bench(args = [5, 50])]
+fn render_tracks(bencher: Bencher, chord_um: u32) {
+    let plan = tracks(chord_um);
     let renderer = Renderer::new(&plan);
     let mut block = Block::default();
     bencher.counter(ItemsCount::new(plan.n_samples())).bench_local(|| {
@@ -178,8 +180,8 @@ fn render_tracks(bencher: Bencher) {
     });
 }
 
-#[divan::bench]
-fn audit_tracks(bencher: Bencher) {
-    let plan = tracks();
+#[divan::bench(args = [50])]
+fn audit_tracks(bencher: Bencher, chord_um: u32) {
+    let plan = tracks(chord_um);
     bencher.counter(ItemsCount::new(plan.n_samples())).bench_local(|| audit(&plan).unwrap());
 }

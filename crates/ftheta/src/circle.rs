@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::lit::Lit;
+use crate::promise::promise;
 use crate::mark::{MarkOptions, Marked, PlanTimes, Played, Stage, plan_times, play_watched};
 use ftheta_model::machine::Machine;
 use ftheta_model::recipe::{ClassicRecipe, Pen};
@@ -69,8 +70,9 @@ pub fn circle(
         play_watched(&plan, options, observer, &mut |trace| lit.add(trace))?;
     let times = PlanTimes { marked_mm: ellipse.length_mm(), ..plan_times(&plan) };
     let (seed, warnings) = (options.seed, Vec::new());
+    let promise = promise(&plan)?;
     Ok(Circled {
-        marked: Marked { plan, settings, times, score, dose, states, seed, warnings },
+        marked: Marked { plan, settings, times, promise, score, dose, states, seed, warnings },
         run_in_s: planned.run_in_s,
         run_out_s: planned.run_out_s,
         turn_s: planned.turn_s,

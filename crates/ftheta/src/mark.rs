@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::atlas_store::AtlasStore;
 use crate::planning::Planning;
+use crate::promise::{Promise, promise};
 use ftheta_model::block::{Block, SampleSink};
 use ftheta_model::dose::DoseMap;
 use ftheta_model::job::Job;
@@ -81,6 +82,8 @@ pub struct Marked {
     pub settings: Settings,
     /// Where the plan's time goes.
     pub times: PlanTimes,
+    /// What contour error the plan promises on motors that are not the nominal one.
+    pub promise: Option<Promise>,
     /// What the beam did on the twin.
     pub score: Score,
     /// The energy on the work plane.
@@ -163,8 +166,10 @@ pub fn mark(
     let Played { score, dose, states } = play(&plan, options, observer)?;
     warnings.extend(shortcomings(&plan, &score));
     let times = plan_times(&plan);
+    let promise = promise(&plan)?;
+    warnings.extend(promise.and_then(|promise| broken(&plan, &promise)));
     let seed = options.seed;
-    Ok(Marked { plan, settings, times, score, dose, states, seed, warnings })
+    Ok(Marked { plan, settings, times, promise, score, dose, states, seed, warnings })
 }
 
 /// The toolpath of a job at the speeds asked for.
@@ -191,6 +196,10 @@ pub(crate) fn lay_out(
 /// Stray energy from which on it is worth a warning.
 const STRAY_WARNING: f64 = 0.01;
 
+/// A promise adds the worst of plan and motor wherever they are, so it may exceed the tolerance by
+/// this much before it is worth a warning.
+const PROMISE_SLACK: f64 = 1.5;
+
 /// Part of a pen's speed below which a mark is called slower.
 const SLOWER_WARNING: f64 = 0.95;
 
@@ -213,6 +222,16 @@ fn shortcomings(plan: &PlanDraft, score: &Score) -> Vec<Warning> {
         warn(format!("pen \"{}\" has no power, so its marks see no light", pen.name));
     }
     warnings
+}
+
+/// A warning where a plan cannot promise its tolerance.
+fn broken(plan: &PlanDraft, promise: &Promise) -> Option<Warning> {
+    let (promised_um, tolerance_um) = (promise.contour_mm() * 1e3, plan.tolerance_mm * 1e3);
+    let message = format!(
+        "on a motor within the machine file's uncertainties the contour error may be \
+         {promised_um:.1} µm, the tolerance is {tolerance_um} µm"
+    );
+    (promised_um > PROMISE_SLACK * tolerance_um).then(|| Warning::new("promise", message))
 }
 
 /// Marks that never reach their pen's speed, pen by pen; with a laser that is only on or off all

@@ -267,33 +267,50 @@ fn stored(folder: &Path) -> MarkOptions {
     MarkOptions { order: Order::Keep, atlas_store, ..MarkOptions::default() }
 }
 
-fn atlas_file(folder: &Path) -> std::path::PathBuf {
+/// The atlas and the solved programs, and nothing half-written.
+fn kept_files(folder: &Path) -> [std::path::PathBuf; 2] {
     let files: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(files.len(), 1, "one atlas and nothing half-written: {files:?}");
-    files[0].clone()
+    assert_eq!(files.len(), 2, "{files:?}");
+    let of_kind = |kind: &str| files.iter().find(|file| file.extension().unwrap() == kind).unwrap();
+    ["atlas", "solved"].map(of_kind).map(Clone::clone)
 }
 
 #[test]
-fn an_atlas_is_kept_and_a_damaged_one_is_built_anew() {
+fn what_is_solved_is_kept_and_made_anew_where_it_is_damaged() {
     let machine = preset("S10-f160");
     let folder = tempfile::tempdir().unwrap();
     let first = run(LINES, &machine, &stored(folder.path())).unwrap();
-    let path = atlas_file(folder.path());
-    let whole = fs::read(&path).unwrap();
     let again = run(LINES, &machine, &stored(folder.path())).unwrap();
     assert_eq!(first.plan.id(), again.plan.id());
     assert!(again.warnings.is_empty(), "{:?}", again.warnings);
-    for damage in [&whole[..whole.len() / 2], b"", b"ftheta-atlas 0\n", b"\xff\xfe"] {
-        fs::write(&path, damage).unwrap();
-        let anew = run(LINES, &machine, &stored(folder.path())).unwrap();
-        assert_eq!(first.plan.id(), anew.plan.id());
-        assert!(anew.warnings.iter().any(|w| w.to_string().contains("made anew")));
-        assert_eq!(fs::read(&path).unwrap(), whole);
+    for path in kept_files(folder.path()) {
+        let whole = fs::read(&path).unwrap();
+        for damage in [&whole[..whole.len() / 2], b"", b"ftheta-atlas 0\n", b"\xff\xfe"] {
+            fs::write(&path, damage).unwrap();
+            let anew = run(LINES, &machine, &stored(folder.path())).unwrap();
+            assert_eq!(first.plan.id(), anew.plan.id());
+            assert!(anew.warnings.iter().any(|w| w.to_string().contains("made anew")));
+            assert!(fs::read(&path).unwrap() == whole, "{path:?}");
+        }
     }
 }
 
+/// Whatever other jobs have left in the store: longer jumps, other corners and transitions.
 #[test]
-fn two_writers_leave_a_whole_atlas() {
+fn plans_do_not_depend_on_what_is_kept() {
+    let machine = preset("S10-f160");
+    let other = r#"<path d="M-40 -30 h1 v1"/><path d="M45 50 v2"/><path d="M12 11 l2 1 v1"/>"#;
+    let cold = run(LINES, &machine, &keep()).unwrap().plan.id();
+    let folder = tempfile::tempdir().unwrap();
+    let cold_other = run(other, &machine, &stored(folder.path())).unwrap().plan.id();
+    assert_eq!(run(LINES, &machine, &stored(folder.path())).unwrap().plan.id(), cold);
+    assert_eq!(run(LINES, &machine, &stored(folder.path())).unwrap().plan.id(), cold);
+    assert_eq!(run(other, &machine, &keep()).unwrap().plan.id(), cold_other);
+    kept_files(folder.path());
+}
+
+#[test]
+fn writers_at_the_same_time_leave_whole_files() {
     let machine = preset("S10-f160");
     let folder = tempfile::tempdir().unwrap();
     let job = || run(LINES, &machine, &stored(folder.path())).unwrap().plan.id();
@@ -302,7 +319,7 @@ fn two_writers_leave_a_whole_atlas() {
         writers.into_iter().map(|writer| writer.join().unwrap()).collect::<Vec<_>>()
     });
     assert!(ids.iter().all(|id| *id == ids[0]));
-    atlas_file(folder.path());
+    kept_files(folder.path());
     assert_eq!(job(), ids[0]);
 }
 

@@ -142,6 +142,18 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
         times.delay_s
     );
     print_limits(marked.plan.limits());
+    if let Some(promise) = &marked.promise {
+        let scanner = &marked.plan.machine.scanner;
+        say!(
+            "promise  contour error {:.1} µm planned; beside it at most {:.1} µm with f1 ±{} %, \
+             {:.1} µm with Kt ±{} %",
+            promise.planned_mm * 1e3,
+            promise.f1_mm * 1e3,
+            scanner.f1_uncertainty * 100.0,
+            promise.kt_mm * 1e3,
+            scanner.kt_uncertainty * 100.0
+        );
+    }
     say!(
         "twin     contour error {:.1} µm max, {:.1} µm p99; ends {:.1} µm max; coverage {:.1} µm max",
         score.contour_error_um.max,

@@ -68,15 +68,8 @@ impl Side {
             && mirror_rad.len() == voltages_v.len() + 1
             && n_before <= voltages_v.len();
         let (voltages_v, mirror_rad) = (voltages_v.to_vec(), mirror_rad.to_vec());
-        let side = Self {
-            speed_rad_s,
-            n_before,
-            voltages_v,
-            mirror_rad,
-            run_rad,
-            loss_s,
-            least_loss_s,
-        };
+        let side =
+            Self { speed_rad_s, n_before, voltages_v, mirror_rad, run_rad, loss_s, least_loss_s };
         whole.then_some(side)
     }
 

@@ -110,10 +110,7 @@ impl Fan {
 
     /// The rays solved so far by their index, but for that of the atlas: size and voltages, `None`
     /// where there is none.
-    pub(super) fn solved(
-        &self,
-        atlas: &Atlas,
-    ) -> impl Iterator<Item = (usize, Option<Vec<f64>>)> {
+    pub(super) fn solved(&self, atlas: &Atlas) -> impl Iterator<Item = (usize, Option<Vec<f64>>)> {
         let n_atlas = usize::from(atlas.solved(self.n_ticks).is_some());
         let numbers = |ray: &Ray| [&[ray.size], &ray.voltages_v[..]].concat();
         let solved = move |(index, ray): (usize, &OnceLock<Option<Ray>>)| {

@@ -14,6 +14,7 @@ use ftheta_physics::audit::CORRECTION_RESERVE;
 use ftheta_physics::follow::TAPS_AFTER;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::scale_mm_per_rad;
+use std::borrow::Cow;
 
 /// Part of the tolerance by which a plan itself may miss a curve; the rest is for the machine.
 const MISS_SHARE: f64 = 0.85;
@@ -51,21 +52,21 @@ pub(super) struct Marking<'a> {
 }
 
 /// A stretch between two turns, and the turn after it.
-struct Piece {
-    stretch: Stretch,
+struct Piece<'a> {
+    stretch: Stretch<'a>,
     laid: Laid,
     /// Its speed as a part of what was asked for.
     part: f64,
 }
 
 /// A mark as it is made: stretches, and between each two a turn with its voltages.
-struct Stroke {
-    pieces: Vec<Piece>,
+struct Stroke<'p> {
+    pieces: Vec<Piece<'p>>,
     turns: Vec<Turn>,
     joints: Vec<Vec<[f64; 2]>>,
 }
 
-impl Stroke {
+impl Stroke<'_> {
     /// Whether it is made at the pen's speed from end to end.
     fn is_steady(&self, pen: &Pen) -> bool {
         match &self.pieces[..] {
@@ -149,12 +150,12 @@ impl Marking<'_> {
     }
 
     /// Stretches and turns of a path, in the draft's tables.
-    fn laid(
+    fn laid<'p>(
         &mut self,
-        path: &Path,
+        path: &'p Path,
         limits: &SpeedLimits,
         place: &str,
-    ) -> Result<Stroke, PlanError> {
+    ) -> Result<Stroke<'p>, PlanError> {
         let turns = self.turns(path, limits)?;
         let pieces = self.pieces(path, &turns, limits, place)?;
         if let Some(joints) = self.joints(&pieces, &turns) {
@@ -170,7 +171,7 @@ impl Marking<'_> {
         mark: Mark,
         path: &Path,
         pen: &Pen,
-        stroke: &Stroke,
+        stroke: &Stroke<'_>,
     ) -> Result<(), PlanError> {
         let Stroke { pieces, turns, joints } = stroke;
         let index = self.weave.draft.marks.len() as u32;
@@ -263,13 +264,13 @@ impl Marking<'_> {
     }
 
     /// The stretches between turns.
-    fn pieces(
+    fn pieces<'p>(
         &mut self,
-        path: &Path,
+        path: &'p Path,
         turns: &[Turn],
         limits: &SpeedLimits,
         place: &str,
-    ) -> Result<Vec<Piece>, PlanError> {
+    ) -> Result<Vec<Piece<'p>>, PlanError> {
         let mut pieces = Vec::with_capacity(turns.len() + 1);
         let last_vertex = path.vertices.len() - 1;
         for index in 0..=turns.len() {
@@ -277,7 +278,10 @@ impl Marking<'_> {
             let after = turns.get(index);
             let from = before.map_or(0, |turn| turn.vertex);
             let to = after.map_or(last_vertex, |turn| turn.vertex);
-            let path = path.part(from, to);
+            let path = match turns.is_empty() {
+                true => Cow::Borrowed(path),
+                false => Cow::Owned(path.part(from, to)),
+            };
             let knots = profile(&path, limits, self.weave.smoothing);
             let whole_s = time_at_s(&knots, path.length_mm());
             let starts_s = before.map_or(-self.run_s[0], |turn| turn.runs_s()[1]);
@@ -316,7 +320,7 @@ impl Marking<'_> {
 
     /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
     /// than the motors stand.
-    fn joints(&self, pieces: &[Piece], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
+    fn joints(&self, pieces: &[Piece<'_>], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
         let mut joints = Vec::with_capacity(turns.len());
         for (turn, pair) in turns.iter().zip(pieces.windows(2)) {
             let voltages = turn.voltages_v([pair[0].part, pair[1].part]);
@@ -332,7 +336,7 @@ impl Marking<'_> {
 
     /// Progress of the beam along the path at every tick of a stretch, from the first to the end,
     /// mm.
-    fn progress_mm(&self, piece: &Piece) -> Vec<f64> {
+    fn progress_mm(&self, piece: &Piece<'_>) -> Vec<f64> {
         let Stretch { knots, path, .. } = &piece.stretch;
         let n_ticks = piece.laid.n_ticks();
         if let [knot] = knots[..] {

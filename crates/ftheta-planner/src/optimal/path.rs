@@ -106,9 +106,9 @@ impl Path {
                 if leg > first && self.stations[leg].distance_mm > high_mm {
                     break;
                 }
-                let (off_mm, along_mm) = self.foot(leg, *place, (low_mm, high_mm));
-                if off_mm < nearest.0 {
-                    nearest = (off_mm, along_mm);
+                let (off_mm2, along_mm) = self.foot(leg, *place, (low_mm, high_mm));
+                if off_mm2 < nearest.0 {
+                    nearest = (off_mm2, along_mm);
                 }
             }
             nearest.1
@@ -116,21 +116,28 @@ impl Path {
         places.iter().zip(around_mm).map(nearest).collect()
     }
 
-    /// Distance of a place from a leg, and arc length of the leg's nearest point between two; before
+    /// Square of the distance of a place from a leg, mm², and arc length of the leg's nearest point between two; before
     /// the first leg and after the last it goes straight on.
     fn foot(&self, leg: usize, place: Point, (low_mm, high_mm): (f64, f64)) -> (f64, f64) {
         let (from, to) = (self.vertices[leg], self.vertices[leg + 1]);
         let start_mm = self.stations[leg].distance_mm;
-        let length_mm = self.stations[leg + 1].distance_mm - start_mm;
+        let end_mm = self.stations[leg + 1].distance_mm;
+        let length_mm = end_mm - start_mm;
         let chord = to - from;
         let share = (place - from).dot(chord) / chord.hypot2();
-        let low = if leg == 0 { f64::NEG_INFINITY } else { 0.0 };
-        let high = if leg + 2 == self.vertices.len() { f64::INFINITY } else { 1.0 };
-        let share = share
-            .clamp(low, high)
-            .max((low_mm - start_mm) / length_mm)
-            .min((high_mm - start_mm) / length_mm);
-        ((from + chord * share).distance(place), start_mm + share * length_mm)
+        let (is_first, is_last) = (leg == 0, leg + 2 == self.vertices.len());
+        let mut share = match (is_first, is_last) {
+            (false, false) => share.clamp(0.0, 1.0),
+            (false, true) => share.max(0.0),
+            (true, false) => share.min(1.0),
+            (true, true) => share,
+        };
+        // Most legs lie between both.
+        if is_first || is_last || start_mm < low_mm || end_mm > high_mm {
+            share =
+                share.max((low_mm - start_mm) / length_mm).min((high_mm - start_mm) / length_mm);
+        }
+        ((from + chord * share - place).hypot2(), start_mm + share * length_mm)
     }
 
     fn push_line(&mut self, to: Point, from: Point) {

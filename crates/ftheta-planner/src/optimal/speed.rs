@@ -52,9 +52,14 @@ pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) 
         limits.acceleration_mm_s2.min(ACCELERATION_SHARE * limits.miss_mm / smoothing.variance_s2);
     let turns = turns(path);
     let mut slow: Vec<Limit> = Vec::new();
+    let mut turning = Turning { first: 0, end: 0, sum_rad: 0.0 };
+    let (reach_mm, calm_rad) = (limits.speed_mm_s * smoothing.half_s, calm_rad(limits, smoothing));
     for (index, turn) in turns.iter().enumerate() {
+        let turned_rad = turning.around(&turns, index, reach_mm);
         let speed_mm_s = if turn.corner_rad.abs() > limits.stop_rad {
             0.0
+        } else if turned_rad < calm_rad {
+            limits.speed_mm_s
         } else {
             passing_mm_s(&turns, index, limits, smoothing, acceleration_mm_s2)
         };
@@ -89,6 +94,39 @@ fn turns(path: &Path) -> Vec<Turn> {
         }
     }
     turns
+}
+
+/// Turns that sum up to less within reach, whatever their sign, are passed at mark speed, rad.
+fn calm_rad(limits: &SpeedLimits, smoothing: &Smoothing) -> f64 {
+    let by_change = 0.5 * limits.change_mm_s / limits.speed_mm_s;
+    let by_miss = limits.miss_mm / (limits.speed_mm_s * smoothing.mean_s);
+    // Less what rounding makes of sums.
+    2.0 * (1.0 - 1e-6) * by_change.min(by_miss).clamp(0.0, 1.0).asin()
+}
+
+/// Sum of turns around one after the other.
+struct Turning {
+    first: usize,
+    end: usize,
+    sum_rad: f64,
+}
+
+impl Turning {
+    /// Sum of the turns within a reach of this one, each without its sign, rad.
+    fn around(&mut self, turns: &[Turn], index: usize, reach_mm: f64) -> f64 {
+        let at_mm = turns[index].at_mm;
+        while let Some(turn) = turns.get(self.end)
+            && turn.at_mm <= at_mm + reach_mm
+        {
+            self.sum_rad += turn.angle_rad.abs();
+            self.end += 1;
+        }
+        while turns[self.first].at_mm < at_mm - reach_mm {
+            self.sum_rad -= turns[self.first].angle_rad.abs();
+            self.first += 1;
+        }
+        self.sum_rad
+    }
 }
 
 /// Greatest speed past a turn and its neighbours.
@@ -135,14 +173,15 @@ fn alone(turns: &[Turn], index: usize, reach_mm: f64) -> bool {
 fn weighed(turns: &[Turn], index: usize, reach_mm: f64) -> (f64, f64) {
     let at_mm = turns[index].at_mm;
     let (mut missed, mut turned) = (turns[index].angle_rad, turns[index].angle_rad);
+    let per_mm = reach_mm.recip();
     let mut add = |turn: &Turn| {
-        let off = (turn.at_mm - at_mm).abs() / reach_mm;
-        if off >= 1.0 {
+        let near = 1.0 - (turn.at_mm - at_mm).abs() * per_mm;
+        if near <= 0.0 {
             return false;
         }
         // What three averages make of a turn beside the middle, within a few hundredths.
-        missed += turn.angle_rad * (1.0 - off).powi(3);
-        turned += turn.angle_rad * (1.0 - off);
+        missed += turn.angle_rad * (near * near * near);
+        turned += turn.angle_rad * near;
         true
     };
     for turn in turns[..index].iter().rev() {

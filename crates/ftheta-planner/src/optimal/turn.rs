@@ -204,7 +204,8 @@ pub(super) fn candidates(
 ) -> Vec<usize> {
     let stations = &path.stations;
     let sharp = |vertex: usize| {
-        let sine = (0.5 * angle(stations[vertex].arriving, stations[vertex].leaving)).sin().abs();
+        // Of half the angle, since both directions have length 1.
+        let sine = 0.5 * (stations[vertex].leaving - stations[vertex].arriving).hypot();
         sine * speed_mm_s * smoothing.mean_s > GENTLE * miss_mm
             || 2.0 * sine * speed_mm_s > change_mm_s
     };

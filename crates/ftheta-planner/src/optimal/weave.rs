@@ -14,6 +14,7 @@ use ftheta_physics::follow::Inverse;
 use ftheta_physics::galvo::{CURRENT, State};
 use ftheta_physics::optics::angles_from_field;
 use kurbo::Point;
+use std::borrow::Cow;
 
 /// Changes of power below this part of it are left out.
 const POWER_STEP: f64 = 2e-3;
@@ -42,8 +43,8 @@ pub(super) struct Weave<'a> {
 
 /// A stretch of a mark, as a track.
 #[derive(Clone, Debug)]
-pub(super) struct Stretch {
-    pub(super) path: Path,
+pub(super) struct Stretch<'a> {
+    pub(super) path: Cow<'a, Path>,
     pub(super) knots: Vec<Knot>,
     /// Ticks from its first place on; it may go on past the path's end.
     pub(super) n_ticks: u32,
@@ -119,7 +120,7 @@ impl<'a> Weave<'a> {
     ///
     /// # Errors
     /// If the optics do not reach a place of it.
-    pub(super) fn lay(&mut self, stretch: &Stretch) -> Result<Laid, PlanError> {
+    pub(super) fn lay(&mut self, stretch: &Stretch<'_>) -> Result<Laid, PlanError> {
         let draft = &mut self.draft;
         let first_vertex = draft.vertices.len() as u32;
         draft.vertices.extend(&stretch.path.vertices);

@@ -209,12 +209,27 @@ impl TrackCursor {
         let since_s = time_s - from_s;
         let acceleration_mm_s2 = if since_s < 0.0 { 0.0 } else { self.acceleration_mm_s2 };
         let at_mm = distance_mm + (speed_mm_s + 0.5 * acceleration_mm_s2 * since_s) * since_s;
-        while at_mm > self.leg.end_mm && self.leg.vertex + 2 <= self.last_vertex {
-            let vertex = self.leg.vertex + 1;
-            let station = self.first_station.map(|first| (first, vertex - self.first_vertex));
-            self.leg = Leg::new(plan, station, vertex, self.leg.end_mm);
+        if at_mm > self.leg.end_mm {
+            self.pass_legs(plan, at_mm);
         }
         self.leg.place(at_mm)
+    }
+
+    /// Enters the leg of an arc length; of legs that are shorter than a tick only the lengths count.
+    fn pass_legs(&mut self, plan: &PlanDraft, at_mm: f64) {
+        let Leg { mut vertex, mut start_mm, mut end_mm, .. } = self.leg;
+        while at_mm > end_mm && vertex + 2 <= self.last_vertex {
+            vertex += 1;
+            start_mm = end_mm;
+            end_mm = match self.first_station {
+                Some(first) => plan.stations[first + vertex + 1 - self.first_vertex].distance_mm,
+                None => start_mm + plan.vertices[vertex + 1].distance(plan.vertices[vertex]),
+            };
+        }
+        if vertex > self.leg.vertex {
+            let station = self.first_station.map(|first| (first, vertex - self.first_vertex));
+            self.leg = Leg::new(plan, station, vertex, start_mm);
+        }
     }
 
     #[inline]

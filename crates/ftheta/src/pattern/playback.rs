@@ -61,7 +61,6 @@ pub(super) fn playback(
     let at = |sample: usize| ((sample as f64 * period_s * rate) as usize).min(words.len() - 1);
     let power_w = options.pen.power_w;
     let block = Block {
-        volts: Vec::new(),
         first_index: 0,
         words: (0..n_samples).map(|sample| words[at(sample)]).collect(),
         volts: Vec::new(),
