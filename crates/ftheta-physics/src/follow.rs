@@ -84,9 +84,9 @@ impl Inverse {
     }
 }
 
-/// Sum of weighted angles.
+/// Sum of weighted angles, of which there are as many as weights.
 #[inline]
-pub fn dot(weights: &Taps, angles_rad: &Taps) -> f64 {
+pub fn dot(weights: &Taps, angles_rad: &[f64]) -> f64 {
     weights.iter().zip(angles_rad).map(|(weight, angle)| weight * angle).sum()
 }
 

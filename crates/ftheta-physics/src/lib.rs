@@ -2,6 +2,7 @@
 //!
 //! Functions of their arguments only. SI units and rad inside kernels; mm in the field.
 
+pub mod along;
 pub mod audit;
 pub mod axis_loop;
 pub mod envelope;

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::lit::Lit;
-use crate::promise::promise;
 use crate::mark::{MarkOptions, Marked, PlanTimes, Played, Stage, plan_times, play_watched};
+use crate::promise::promise;
 use ftheta_model::machine::Machine;
 use ftheta_model::recipe::{ClassicRecipe, Pen};
 use ftheta_physics::plan::Plan;

@@ -196,10 +196,6 @@ pub(crate) fn lay_out(
 /// Stray energy from which on it is worth a warning.
 const STRAY_WARNING: f64 = 0.01;
 
-/// A promise adds the worst of plan and motor wherever they are, so it may exceed the tolerance by
-/// this much before it is worth a warning.
-const PROMISE_SLACK: f64 = 1.5;
-
 /// Part of a pen's speed below which a mark is called slower.
 const SLOWER_WARNING: f64 = 0.95;
 
@@ -231,7 +227,7 @@ fn broken(plan: &PlanDraft, promise: &Promise) -> Option<Warning> {
         "on a motor within the machine file's uncertainties the contour error may be \
          {promised_um:.1} µm, the tolerance is {tolerance_um} µm"
     );
-    (promised_um > PROMISE_SLACK * tolerance_um).then(|| Warning::new("promise", message))
+    (promised_um > tolerance_um).then(|| Warning::new("promise", message))
 }
 
 /// Marks that never reach their pen's speed, pen by pen; with a laser that is only on or off all

@@ -16,7 +16,7 @@ use ftheta_planner::optimal::{self, Motions, OptimalOptions, OptimalPlanner, Res
 
 /// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
 /// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
-const HELD_SHARE: f64 = 0.75;
+const HELD_SHARE: f64 = 0.72;
 
 /// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
 const EPSILON_MIN_RAD: f64 = 2e-8;

@@ -2,21 +2,22 @@
 
 use crate::Error;
 use ftheta_model::block::Block;
-use ftheta_model::machine::Machine;
+use ftheta_model::space::MirrorAngles;
+use ftheta_physics::along::Along;
 use ftheta_physics::axis_loop::AxisLoop;
 use ftheta_physics::galvo::{Galvo, State};
-use ftheta_physics::optics::scale_mm_per_rad;
+use ftheta_physics::optics::field_from_angles;
 use ftheta_physics::plan::Plan;
 use ftheta_physics::servo::Gains;
 use ftheta_planner::render::Renderer;
+use std::thread;
 
-/// Greatest errors while light is on, mm.
+/// Greatest distances of the lit beam from its mark, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Promise {
-    /// Distance of the planned beam from its mark.
+    /// As planned.
     pub planned_mm: f64,
-    /// By how much the beam of a motor whose torsional mode is off by the machine file's uncertainty
-    /// is beside the planned one.
+    /// On a motor whose torsional mode is off by the machine file's uncertainty, either way.
     pub f1_mm: f64,
     /// The same for the torque constant.
     pub kt_mm: f64,
@@ -25,35 +26,7 @@ pub struct Promise {
 impl Promise {
     /// Contour error on any one of these motors.
     pub fn contour_mm(&self) -> f64 {
-        self.planned_mm + self.f1_mm.max(self.kt_mm)
-    }
-}
-
-/// Both axes of a motor, and how much its beam has been beside the nominal one, rad.
-struct Motor {
-    axes: [AxisLoop; 2],
-    row: State,
-    beside_rad: f64,
-}
-
-impl Motor {
-    fn new(plant: &Galvo, gains: Gains, machine: &Machine) -> Self {
-        let axis = AxisLoop::new(plant, gains, &machine.scanner, machine.output.period_s());
-        Self { axes: [axis.clone(), axis], row: plant.mirror_row(), beside_rad: 0.0 }
-    }
-
-    fn mirrors_rad(&self) -> [f64; 2] {
-        [0, 1].map(|axis| self.row.dot(self.axes[axis].state()))
-    }
-
-    fn tick(&mut self, block: &Block, index: usize, rad_per_word: f64) {
-        let word = block.words[index];
-        for (axis, word) in [word.x, word.y].into_iter().enumerate() {
-            match block.volts.get(index) {
-                Some(planned) => self.axes[axis].tick_beside(&planned[axis], 0.0),
-                None => self.axes[axis].tick(f64::from(word) * rad_per_word, 0.0),
-            };
-        }
+        self.planned_mm.max(self.f1_mm).max(self.kt_mm)
     }
 }
 
@@ -64,60 +37,81 @@ impl Motor {
 /// If the machine's servo cannot be built.
 ///
 /// # Accuracy
-/// At ticks; the field distance of an angle is taken in the field's centre.
+/// At ticks, and as [`Along::new`]; no noise and no sensor errors.
 pub fn promise(plan: &Plan) -> Result<Option<Promise>, Error> {
     let Some(planned_mm) = plan.planned_error_mm() else {
         return Ok(None);
     };
-    let machine = &plan.machine;
-    let scanner = &machine.scanner;
-    let gains = Gains::design(scanner, machine.output.period_s())?;
+    let scanner = &plan.machine.scanner;
+    let gains = Gains::design(scanner, plan.machine.output.period_s())?;
     let nominal = Galvo::new(scanner);
-    let plants = [-1.0, 1.0].map(|sign| {
-        let omega = nominal.omega * (1.0 + sign * scanner.f1_uncertainty);
-        let torque_constant = nominal.torque_constant * (1.0 + sign * scanner.kt_uncertainty);
-        [Galvo { omega, ..nominal }, Galvo { torque_constant, ..nominal }]
+    let mode = |part: f64| Galvo { omega: nominal.omega * (1.0 + part), ..nominal };
+    let torque =
+        |part: f64| Galvo { torque_constant: nominal.torque_constant * (1.0 + part), ..nominal };
+    let (f1, kt) = (scanner.f1_uncertainty, scanner.kt_uncertainty);
+    let plants = [mode(-f1), mode(f1), torque(-kt), torque(kt)];
+    let errors_mm = thread::scope(|scope| {
+        let played = plants.map(|plant| scope.spawn(move || worst_mm(plan, &plant, gains)));
+        // A panic in another thread is a panic here.
+        played.map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     });
-    let mut reference = Motor::new(&nominal, gains, machine);
-    let mut motors = plants.as_flattened().iter().map(|plant| Motor::new(plant, gains, machine));
-    let mut motors: [Motor; 4] = std::array::from_fn(|_| motors.next()).map(|motor| {
-        motor.unwrap_or_else(|| Motor::new(&nominal, gains, machine))
-    });
+    let [slow, fast, weak, strong] = errors_mm;
+    Ok(Some(Promise { planned_mm, f1_mm: slow.max(fast), kt_mm: weak.max(strong) }))
+}
+
+/// Greatest distance of the lit beam from its marks on a motor, mm.
+fn worst_mm(plan: &Plan, plant: &Galvo, gains: Gains) -> f64 {
+    let machine = &plan.machine;
+    let axis = AxisLoop::new(plant, gains, &machine.scanner, machine.output.period_s());
+    let mut axes = [axis.clone(), axis];
+    let row: State = plant.mirror_row();
     let rad_per_word = machine.output.word_step_rad();
     let period_ns = i64::from(machine.output.period_ns);
     let mut renderer = Renderer::new(plan);
     let mut block = Block::default();
-    let mut mark = 0;
+    let mut lit = Lit { plan, mark: 0, along: None };
+    let mut worst_mm = 0.0_f64;
     while renderer.next_block(&mut block) {
-        for index in 0..block.words.len() {
+        for (index, word) in block.words.iter().enumerate() {
+            for (axis, word) in [word.x, word.y].into_iter().enumerate() {
+                match block.volts.get(index) {
+                    Some(planned) => axes[axis].tick_beside(&planned[axis], 0.0),
+                    None => axes[axis].tick(f64::from(word) * rad_per_word, 0.0),
+                };
+            }
             let end_ns = (block.first_index as i64 + index as i64 + 1) * period_ns;
-            reference.tick(&block, index, rad_per_word);
-            let lit = is_lit(plan, &mut mark, end_ns);
-            let [x, y] = reference.mirrors_rad();
-            for motor in &mut motors {
-                motor.tick(&block, index, rad_per_word);
-                if lit {
-                    let [other_x, other_y] = motor.mirrors_rad();
-                    motor.beside_rad = motor.beside_rad.max((other_x - x).hypot(other_y - y));
-                }
+            if let Some(along) = lit.at(end_ns) {
+                let [x_rad, y_rad] = [0, 1].map(|axis| row.dot(axes[axis].state()));
+                let place = field_from_angles(&machine.optics, MirrorAngles { x_rad, y_rad });
+                worst_mm = worst_mm.max(along.distance_mm(place.into()));
             }
         }
     }
-    let scale = scale_mm_per_rad(&machine.optics);
-    let worst = |one: usize, other: usize| {
-        scale * motors[one].beside_rad.max(motors[other].beside_rad)
-    };
-    Ok(Some(Promise { planned_mm, f1_mm: worst(0, 2), kt_mm: worst(1, 3) }))
+    worst_mm
 }
 
-/// Whether light is emitted at a time; times may not fall.
-fn is_lit(plan: &Plan, mark: &mut usize, time_ns: i64) -> bool {
-    let laser = &plan.machine.laser;
-    while let Some(planned) = plan.marks.get(*mark) {
-        if time_ns <= planned.off_ns as i64 + laser.off_latency_ns {
-            return time_ns >= planned.on_ns as i64 + laser.on_latency_ns;
+/// The mark that is lit.
+struct Lit<'a> {
+    plan: &'a Plan,
+    mark: usize,
+    along: Option<Along>,
+}
+
+impl Lit<'_> {
+    /// The curve that light falls on at a time; times may not fall.
+    fn at(&mut self, time_ns: i64) -> Option<&mut Along> {
+        let laser = &self.plan.machine.laser;
+        while let Some(mark) = self.plan.marks.get(self.mark) {
+            if time_ns > mark.off_ns as i64 + laser.off_latency_ns {
+                self.mark += 1;
+                self.along = None;
+            } else if time_ns < mark.on_ns as i64 + laser.on_latency_ns {
+                return None;
+            } else {
+                let new = || Along::new(&mark.curve, self.plan.tolerance_mm);
+                return Some(self.along.get_or_insert_with(new));
+            }
         }
-        *mark += 1;
+        None
     }
-    false
 }

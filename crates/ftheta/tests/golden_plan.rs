@@ -9,8 +9,12 @@ use ftheta::model::plan::{Motion, PlanDraft};
 use ftheta::model::recipe::Recipe;
 use ftheta::model::toolpath::Toolpath;
 use ftheta::planner::classic::{self, Settings};
-use ftheta::planner::jump::{Atlas, AxisOptions, CurrentBound, Model};
-use ftheta::planner::optimal;
+use ftheta::physics::servo::Gains;
+use ftheta::planner::corner::Corners;
+use ftheta::planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
+use ftheta::planner::optimal::{
+    Corner, Motions, OptimalOptions, OptimalPlanner, RESTRAINTS, longest_step_rad,
+};
 use ftheta::toolpath::lay::{LayOptions, Order, lay};
 use std::fmt::Write;
 
@@ -24,26 +28,22 @@ fn dump(draft: &PlanDraft) -> String {
     for segment in &draft.segments {
         let owner = segment.mark_index.map_or("jump".into(), |index| format!("mark {index}"));
         let n_ticks = segment.n_ticks;
+        let end = segment.motion.ends().map(|(_, last)| draft.vertices[last]);
+        let to = end.map_or(String::new(), |to| format!(" to {:.6} {:.6}", to.x, to.y));
         match segment.motion {
-            Motion::Hold { vertex } => {
-                let at = draft.vertices[vertex as usize];
-                writeln!(out, "{owner}: hold {n_ticks} at {:.6} {:.6}", at.x, at.y).unwrap();
-            }
-            Motion::Jump { sequence, .. } => {
-                let to = draft.vertices[segment.motion.last_vertex()];
-                let (x, y) = (to.x, to.y);
-                writeln!(out, "{owner}: {n_ticks} voltages of {sequence} to {x:.6} {y:.6}")
-                    .unwrap();
+            Motion::Hold { .. } => writeln!(out, "{owner}: hold {n_ticks}{to}").unwrap(),
+            Motion::Drive { .. } => writeln!(out, "{owner}: {n_ticks} voltages").unwrap(),
+            Motion::Track { first_knot, n_knots, .. } => {
+                let knots = &draft.knots[first_knot as usize..(first_knot + n_knots) as usize];
+                let speeds: Vec<_> =
+                    knots.iter().map(|knot| format!("{:.3}", knot.speed_mm_s)).collect();
+                let speeds = speeds.join(", ");
+                writeln!(out, "{owner}: track {n_ticks}{to} at {speeds} mm/s").unwrap();
             }
             Motion::Travel { profile, .. } => {
-                let to = draft.vertices[segment.motion.last_vertex()];
                 let (length, speed) = (profile.length_mm, profile.speed_mm_s);
-                writeln!(
-                    out,
-                    "{owner}: travel {n_ticks} to {:.6} {:.6}, {length:.6} mm at {speed} mm/s",
-                    to.x, to.y
-                )
-                .unwrap();
+                writeln!(out, "{owner}: travel {n_ticks}{to}, {length:.6} mm at {speed} mm/s")
+                    .unwrap();
             }
         }
     }
@@ -66,29 +66,38 @@ fn corner_and_line() -> (Toolpath, Machine, Settings) {
 
 #[test]
 fn optimal() {
-    let (toolpath, machine, settings) = corner_and_line();
+    let (toolpath, machine, _) = corner_and_line();
     let axis = AxisOptions {
-        model: Model::Robust { epsilon_rad: 1e-5 },
+        model: Model::Held { epsilon_rad: 2e-5 },
         tick_s: 1e-5,
         voltage_reserve: 0.12,
         current_bound: CurrentBound::Always,
     };
     let mut atlas = Atlas::restore(&machine.scanner, axis, Default::default()).unwrap();
-    let draft = optimal::draft(toolpath, &machine, &settings, 0.01, (&mut atlas, 0.95)).unwrap();
+    atlas.extend(0, longest_step_rad(&toolpath, &machine)).unwrap();
+    let transitions = Transitions::with_atlas(atlas).unwrap();
+    let gains = Gains::design(&machine.scanner, 1e-5).unwrap();
+    let corners = Corners::new(&machine.scanner, axis, Some(&gains)).unwrap();
+    let options = OptimalOptions {
+        tolerance_mm: 0.01,
+        corner: Corner::Auto,
+        voltage_reserve: 0.12,
+        restraint: RESTRAINTS[0],
+    };
+    let motions = Motions::Known { transitions: &transitions, corners: &corners };
+    let draft = OptimalPlanner::new(&machine, motions, options).unwrap().draft(toolpath).unwrap();
     expect![[r#"
-        mark 0 #corner: light edges 524190 2699190 ns, 10 W
-        mark 1 #line: light edges 3204190 4327224 ns, 10 W
-        jump: hold 2 at 0.000000 0.000000
-        jump: 37 voltages of 0 to -3.000000 3.000000
-        mark 0: travel 101 to -1.995000 3.000000, 1.005000 mm at 1000 mm/s
-        mark 0: hold 16 at -1.995000 3.000000
-        mark 0: travel 100 to -1.995000 2.000000, 1.000000 mm at 1000 mm/s
-        jump: hold 16 at -1.995000 2.000000
-        jump: 35 voltages of 1 to 0.000000 0.000000
-        mark 1: travel 112 to 1.000000 -0.500000, 1.118034 mm at 1000 mm/s
-        jump: hold 16 at 1.000000 -0.500000
-        jump: 31 voltages of 2 to 0.000000 0.000000
-        jump: hold 146 at 0.000000 0.000000
+        mark 0 #corner: light edges 370000 2381904 ns, 9.90982393096198 W
+        mark 1 #line: light edges 2690000 3813034 ns, 10 W
+        jump: hold 4 to 0.000000 0.000000
+        jump: 34 voltages
+        mark 0: track 87 to -1.995000 3.000000 at 990.982 mm/s
+        mark 0: 28 voltages
+        mark 0: track 86 to -1.995000 2.000000 at 1000.000 mm/s
+        jump: 31 voltages
+        mark 1: track 112 to 1.000000 -0.500000 at 1000.000 mm/s
+        jump: 28 voltages
+        jump: hold 55 to 0.000000 0.000000
     "#]]
     .assert_eq(&dump(&draft));
 }
@@ -100,20 +109,20 @@ fn classic() {
     expect![[r#"
         mark 0 #corner: light edges 1454190 3629190 ns, 10 W
         mark 1 #line: light edges 4704190 5827224 ns, 10 W
-        jump: hold 2 at 0.000000 0.000000
+        jump: hold 2 to 0.000000 0.000000
         jump: travel 107 to -3.000000 3.000000, 4.242641 mm at 4000 mm/s
-        jump: hold 23 at -3.000000 3.000000
+        jump: hold 23 to -3.000000 3.000000
         mark 0: travel 101 to -1.995000 3.000000, 1.005000 mm at 1000 mm/s
-        mark 0: hold 16 at -1.995000 3.000000
+        mark 0: hold 16 to -1.995000 3.000000
         mark 0: travel 100 to -1.995000 2.000000, 1.000000 mm at 1000 mm/s
-        jump: hold 16 at -1.995000 2.000000
+        jump: hold 16 to -1.995000 2.000000
         jump: travel 71 to 0.000000 0.000000, 2.824894 mm at 4000 mm/s
-        jump: hold 21 at 0.000000 0.000000
+        jump: hold 21 to 0.000000 0.000000
         mark 1: travel 112 to 1.000000 -0.500000, 1.118034 mm at 1000 mm/s
-        jump: hold 16 at 1.000000 -0.500000
+        jump: hold 16 to 1.000000 -0.500000
         jump: travel 28 to 0.000000 0.000000, 1.118034 mm at 4000 mm/s
-        jump: hold 18 at 0.000000 0.000000
-        jump: hold 146 at 0.000000 0.000000
+        jump: hold 18 to 0.000000 0.000000
+        jump: hold 146 to 0.000000 0.000000
     "#]]
     .assert_eq(&dump(&draft));
 }

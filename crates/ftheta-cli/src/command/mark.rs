@@ -145,8 +145,7 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
     if let Some(promise) = &marked.promise {
         let scanner = &marked.plan.machine.scanner;
         say!(
-            "promise  contour error {:.1} µm planned; beside it at most {:.1} µm with f1 ±{} %, \
-             {:.1} µm with Kt ±{} %",
+            "promise  contour error {:.1} µm as planned, {:.1} µm with f1 ±{} %, {:.1} µm with Kt ±{} %",
             promise.planned_mm * 1e3,
             promise.f1_mm * 1e3,
             scanner.f1_uncertainty * 100.0,

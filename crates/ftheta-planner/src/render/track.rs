@@ -163,7 +163,7 @@ pub(super) fn references<'a>(
     taps: &'a Taps,
     [x_rad, y_rad]: [&'a [f64]; 2],
 ) -> impl Iterator<Item = [f64; 2]> + 'a {
-    x_rad.array_windows().zip(y_rad.array_windows()).map(move |(x, y)| [dot(taps, x), dot(taps, y)])
+    x_rad.windows(N_TAPS).zip(y_rad.windows(N_TAPS)).map(move |(x, y)| [dot(taps, x), dot(taps, y)])
 }
 
 /// State and voltage of both axes at the tick of a sample from the angles around it.
