@@ -156,7 +156,7 @@ impl<'a> OptimalPlanner<'a> {
                 let current_max_a = current_share * machine.scanner.current_max_a;
                 let reserve = options.voltage_reserve;
                 let fly_by = FlyBy::new(transitions, machine, gains, reserve, current_max_a);
-                (Mover::Voltage(fly_by), Some(corners))
+                (Mover::Voltage(Box::new(fly_by)), Some(corners))
             }
             Motions::Lag => {
                 smoothing = smoothing.with_servo(lag_s);

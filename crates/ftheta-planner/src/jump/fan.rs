@@ -176,8 +176,8 @@ impl Fan {
             return None;
         }
         let between =
-            |pair: &[[f64; 2]; 2]| cross(pair[0], point) >= 0.0 && cross(point, pair[1]) >= 0.0;
-        let index = DIRECTIONS.array_windows().position(between)?;
+            |pair: &[[f64; 2]]| cross(pair[0], point) >= 0.0 && cross(point, pair[1]) >= 0.0;
+        let index = DIRECTIONS.windows(2).position(between)?;
         // A ray that could not be solved is left out.
         let (first, from) = (0..=index).rev().find_map(|index| self.tip(axis, index))?;
         let (second, to) = (index + 1..=N_RAYS).find_map(|index| self.tip(axis, index))?;

@@ -22,7 +22,7 @@ const POWER_STEP: f64 = 2e-3;
 /// What moves the mirrors between marks.
 pub(super) enum Mover<'a> {
     /// Voltages, by a servo that is known.
-    Voltage(FlyBy<'a>),
+    Voltage(Box<FlyBy<'a>>),
     /// Angles, followed by any servo after its lag, s.
     Angle(Glide, f64),
 }
