@@ -164,7 +164,8 @@ fn publish(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Everything that decides what programs give: what decides the atlas, and what corners have besides.
+/// Everything that decides what programs give: what decides the atlas, and what corners have
+/// besides.
 fn solved_key(atlas: &Atlas) -> CacheKey {
     let (scanner, axis) = (atlas.scanner(), atlas.axis_options());
     let besides = [scanner.kt_uncertainty, scanner.speed_max_rad_s];

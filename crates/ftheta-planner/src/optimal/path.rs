@@ -116,8 +116,8 @@ impl Path {
         places.iter().zip(around_mm).map(nearest).collect()
     }
 
-    /// Square of the distance of a place from a leg, mm², and arc length of the leg's nearest point between two; before
-    /// the first leg and after the last it goes straight on.
+    /// Square of the distance of a place from a leg, mm², and arc length of the leg's nearest point
+    /// between two; before the first leg and after the last it goes straight on.
     fn foot(&self, leg: usize, place: Point, (low_mm, high_mm): (f64, f64)) -> (f64, f64) {
         let (from, to) = (self.vertices[leg], self.vertices[leg + 1]);
         let start_mm = self.stations[leg].distance_mm;

@@ -215,7 +215,7 @@ impl TrackCursor {
         self.leg.place(at_mm)
     }
 
-    /// Enters the leg of an arc length; of legs that are shorter than a tick only the lengths count.
+    /// Enters the leg of an arc length; of legs that are passed within a tick only lengths count.
     fn pass_legs(&mut self, plan: &PlanDraft, at_mm: f64) {
         let Leg { mut vertex, mut start_mm, mut end_mm, .. } = self.leg;
         while at_mm > end_mm && vertex + 2 <= self.last_vertex {
