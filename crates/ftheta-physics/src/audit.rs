@@ -137,6 +137,11 @@ impl AuditError {
         matches!(self, Self::Limit { quantity, .. } if strains.contains(quantity))
     }
 
+    /// Whether the beam misses its mark, or its dose, which more care mends.
+    pub fn is_miss(&self) -> bool {
+        matches!(self, Self::Limit { quantity, .. } if beam::MISSES.contains(quantity))
+    }
+
     /// Place, value and limit for a machine-readable message.
     pub fn fault(&self) -> (String, String, String) {
         match self {

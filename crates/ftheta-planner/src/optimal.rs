@@ -93,6 +93,8 @@ impl Corner {
 pub struct OptimalOptions {
     /// Greatest distance of the beam from a mark's curve, mm.
     pub tolerance_mm: f64,
+    /// Part of what a plan may miss a curve by that it does: less leaves more to the machine.
+    pub care: f64,
     /// How corners are taken.
     pub corner: Corner,
     /// Part of the voltage that planned motion leaves to the servo, the restraint's included.

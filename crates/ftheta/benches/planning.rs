@@ -76,6 +76,7 @@ static SOLVER: LazyLock<Solver> = LazyLock::new(|| {
 fn prepared() -> OptimalPlanner<'static> {
     let Solver { machine, transitions, corners } = &*SOLVER;
     let options = OptimalOptions {
+        care: 1.0,
         tolerance_mm: TOLERANCE_MM,
         corner: Corner::Auto,
         voltage_reserve: RESERVE,

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::atlas_store::AtlasStore;
 use crate::planning::Planning;
-use crate::promise::{Promise, promise};
+use crate::promise::Promise;
 use ftheta_model::block::{Block, SampleSink};
 use ftheta_model::dose::DoseMap;
 use ftheta_model::job::Job;
@@ -162,11 +162,10 @@ pub fn mark(
     observer(Stage::Plan);
     let settings = Settings::new(machine, &recipe.classic)?;
     let planning = Planning { machine, settings: &settings, options };
-    let plan = planning.plan(toolpath, &mut warnings, observer)?;
+    let (plan, promise) = planning.plan(toolpath, &mut warnings, observer)?;
     let Played { score, dose, states } = play(&plan, options, observer)?;
     warnings.extend(shortcomings(&plan, &score));
     let times = plan_times(&plan);
-    let promise = promise(&plan)?;
     warnings.extend(promise.and_then(|promise| broken(&plan, &promise)));
     let seed = options.seed;
     Ok(Marked { plan, settings, times, promise, score, dose, states, seed, warnings })

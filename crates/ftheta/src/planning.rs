@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::mark::{MarkOptions, Stage};
+use crate::promise::{Promise, promise};
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::Planner;
 use ftheta_model::toolpath::Toolpath;
@@ -16,7 +17,10 @@ use ftheta_planner::optimal::{self, Motions, OptimalOptions, OptimalPlanner, Res
 
 /// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
 /// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
-const HELD_SHARE: f64 = 0.72;
+const HELD_SHARE: f64 = 0.75;
+
+/// Parts of what a plan may miss its marks by, in the order to be tried.
+const CARES: [f64; 3] = [1.0, 0.75, 0.5];
 
 /// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
 const EPSILON_MIN_RAD: f64 = 2e-8;
@@ -33,19 +37,57 @@ pub(crate) struct Planning<'a> {
 }
 
 impl Planning<'_> {
-    /// The audited plan by the planner asked for, or the best that the machine allows.
+    /// The audited plan by the planner asked for, or the best that the machine allows, and what it
+    /// promises on motors that are not the nominal one.
     pub(crate) fn plan(
         &self,
         toolpath: Toolpath,
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
-    ) -> Result<Plan, Error> {
+    ) -> Result<(Plan, Option<Promise>), Error> {
         match self.options.planner {
-            Some(Planner::Classic) => self.plan_classic(toolpath, observer),
+            Some(Planner::Classic) => Ok((self.plan_classic(toolpath, observer)?, None)),
             Some(Planner::Optimal) | None if optimal::is_servo_known(self.machine) => {
-                self.plan_optimal(&toolpath, warnings, observer)
+                self.plan_with_care(&toolpath, warnings, observer)
             }
-            Some(Planner::Optimal) | None => self.plan_by_lag(toolpath, observer),
+            Some(Planner::Optimal) | None => Ok((self.plan_by_lag(toolpath, observer)?, None)),
+        }
+    }
+
+    /// Plans with ever more care, until the tolerance is kept on every motor within the machine
+    /// file's uncertainties; where that cannot be, the plan that comes nearest.
+    fn plan_with_care(
+        &self,
+        toolpath: &Toolpath,
+        warnings: &mut Vec<Warning>,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<(Plan, Option<Promise>), Error> {
+        let mut best: Option<(Plan, Promise)> = None;
+        let mut refused = None;
+        for care in CARES {
+            let plan = match self.plan_optimal(toolpath, care, warnings, observer) {
+                Ok(plan) => plan,
+                Err(Error::Audit(error)) if error.is_miss() => {
+                    refused = Some(error);
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            let Some(promise) = promise(&plan)? else {
+                return Ok((plan, None));
+            };
+            let promised_mm = promise.contour_mm();
+            if best.as_ref().is_none_or(|(_, best)| promised_mm < best.contour_mm()) {
+                best = Some((plan, promise));
+            }
+            if promised_mm <= self.options.tolerance_mm {
+                break;
+            }
+        }
+        match (best, refused) {
+            (Some((plan, promise)), _) => Ok((plan, Some(promise))),
+            (None, Some(error)) => Err(error.into()),
+            (None, None) => Ok((self.plan_classic(toolpath.clone(), observer)?, None)),
         }
     }
 
@@ -56,22 +98,23 @@ impl Planning<'_> {
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
         observer(Stage::Plan);
-        let optimal = self.optimal(optimal::RESTRAINTS[0], self.options.reserve);
+        let optimal = self.optimal(optimal::RESTRAINTS[0], self.options.reserve, CARES[0]);
         let planner = OptimalPlanner::new(self.machine, Motions::Lag, optimal)?;
         let draft = planner.draft(toolpath)?;
         observer(Stage::Audit);
         Ok(Plan::new(draft)?)
     }
 
-    fn optimal(&self, restraint: Restraint, voltage_reserve: f64) -> OptimalOptions {
+    fn optimal(&self, restraint: Restraint, voltage_reserve: f64, care: f64) -> OptimalOptions {
         let MarkOptions { tolerance_mm, corner, .. } = *self.options;
-        OptimalOptions { tolerance_mm, corner, voltage_reserve, restraint }
+        OptimalOptions { tolerance_mm, care, corner, voltage_reserve, restraint }
     }
 
     /// Plans with ever more restraint, until the audit finds that driver and coils stand it.
     fn plan_optimal(
         &self,
         toolpath: &Toolpath,
+        care: f64,
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
@@ -82,7 +125,7 @@ impl Planning<'_> {
             observer(Stage::Plan);
             let voltage_reserve = atlas.axis_options().voltage_reserve;
             let transitions = Transitions::with_atlas(atlas)?;
-            let optimal = self.optimal(restraint, voltage_reserve);
+            let optimal = self.optimal(restraint, voltage_reserve, care);
             let gains = Gains::design(&machine.scanner, machine.output.period_s())?;
             let scanner = transitions.atlas().scanner().clone();
             let corners = Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;

@@ -79,6 +79,7 @@ fn optimal() {
     let gains = Gains::design(&machine.scanner, 1e-5).unwrap();
     let corners = Corners::new(&machine.scanner, axis, Some(&gains)).unwrap();
     let options = OptimalOptions {
+        care: 1.0,
         tolerance_mm: 0.01,
         corner: Corner::Auto,
         voltage_reserve: 0.12,

@@ -10,6 +10,11 @@ use kurbo::Point;
 /// Part of the dose that may be missing for good, besides what a spot and two tolerances make of it
 /// at any place.
 const DOSE_SHARE: f64 = 0.005;
+/// What is called so in messages.
+const OFF_MARK: &str = "distance of the lit beam from its mark";
+const WRONG_DOSE: &str = "length that has too much or too little energy";
+/// Both of them.
+pub const MISSES: [&str; 2] = [OFF_MARK, WRONG_DOSE];
 /// Rounding of times and powers.
 const ROUNDING: f64 = 1e-6;
 
@@ -105,7 +110,7 @@ impl<'a> Beam<'a> {
             (self.along.distance_mm(place), self.draft.tolerance_mm * (1.0 + ROUNDING));
         self.worst_mm = self.worst_mm.max(value);
         if value.is_nan() || value > limit {
-            let quantity = "distance of the lit beam from its mark";
+            let quantity = OFF_MARK;
             let place = format!("mark {} ({})", self.mark_index, mark.source);
             return Err(AuditError::Limit { place, quantity, value, limit, unit: "mm" });
         }
@@ -145,7 +150,7 @@ impl<'a> Beam<'a> {
         let limit = spot_mm + 2.0 * self.draft.tolerance_mm + DOSE_SHARE * at_mm;
         let value = (self.given_mm - at_mm).abs();
         if value.is_nan() || value > limit {
-            let quantity = "length that has too much or too little energy";
+            let quantity = WRONG_DOSE;
             let place = format!("mark {} ({})", self.mark_index, mark.source);
             return Err(AuditError::Limit { place, quantity, value, limit, unit: "mm" });
         }

@@ -220,7 +220,7 @@ impl Marking<'_> {
         let (Some(corners), true) = (self.corners, limits.stop_rad == f64::INFINITY) else {
             return Ok(Vec::new());
         };
-        let tolerance_mm = self.options.tolerance_mm;
+        let tolerance_mm = self.options.care * self.options.tolerance_mm;
         let allowance = Allowance {
             contour_mm: TURN_SHARE * tolerance_mm,
             coverage_mm: COVERAGE_SHARE * tolerance_mm,
@@ -365,7 +365,7 @@ impl Marking<'_> {
         SpeedLimits {
             speed_mm_s,
             acceleration_mm_s2: ALONG_SHARE * most * scale,
-            miss_mm: MISS_SHARE * self.options.tolerance_mm,
+            miss_mm: MISS_SHARE * self.options.care * self.options.tolerance_mm,
             change_mm_s: self.weave.smoothing.change_max_mm_s(
                 speed_mm_s,
                 voltage_max_v,
