@@ -73,8 +73,8 @@ impl AxisLoop {
         self.advance(acting_v)
     }
 
-    /// Takes a planned voltage with the planned state, and moves on: the servo, which must be one of
-    /// state feedback, adds what it makes of the difference.
+    /// Takes a planned voltage with the planned state, and moves on: the servo, which must be one
+    /// of state feedback, adds what it makes of the difference.
     pub fn tick_beside(&mut self, planned: &VoltageSample, sensor_error_rad: f64) -> f64 {
         let acting_v = self.limited(self.pending_v);
         let answer_v =

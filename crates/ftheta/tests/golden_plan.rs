@@ -8,8 +8,8 @@ use ftheta::model::machine::Machine;
 use ftheta::model::plan::{Motion, PlanDraft};
 use ftheta::model::recipe::Recipe;
 use ftheta::model::toolpath::Toolpath;
-use ftheta::planner::classic::{self, Settings};
 use ftheta::physics::servo::Gains;
+use ftheta::planner::classic::{self, Settings};
 use ftheta::planner::corner::Corners;
 use ftheta::planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
 use ftheta::planner::optimal::{

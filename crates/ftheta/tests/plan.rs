@@ -58,7 +58,7 @@ fn audit_refuses_gaps_and_wrong_indices() {
     malformed(refusal(|draft| {
         let travel = draft.segments.iter_mut().find_map(|segment| match &mut segment.motion {
             Motion::Travel { profile, .. } => Some(profile),
-            Motion::Hold { .. } | Motion::Jump { .. } => None,
+            Motion::Hold { .. } | Motion::Track { .. } | Motion::Drive { .. } => None,
         });
         travel.unwrap().length_mm *= 1.01;
     }));

@@ -14,8 +14,9 @@ struct Window {
 
 /// Checks power, order and place in time of every light interval.
 ///
-/// Light follows its edge by the laser's latency, and has to lie within its mark's segments, as the
-/// mirrors make them; settings of a classic controller may be wrong by one servo lag, never by more.
+/// Light follows its edge by the laser's latency, and has to lie within its mark's segments, as
+/// the mirrors make them; settings of a classic controller may be wrong by one servo lag, never by
+/// more.
 ///
 /// * `lag_s`: the nominal servo's lag
 /// * `by_voltage`: whether commands of tracks and drives are computed from voltages

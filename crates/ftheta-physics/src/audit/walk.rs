@@ -125,7 +125,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Distance between the mirrors, when the voltages before have acted, and where `motion` begins.
+    /// Distance between the mirrors, when the voltages before have acted, and where `motion`
+    /// begins.
     fn gap(&self, motion: &Motion) -> f64 {
         let wanted = match (motion, &self.track) {
             (&Motion::Hold { vertex }, _) => {

@@ -20,8 +20,8 @@ use std::borrow::Cow;
 const MISS_SHARE: f64 = 0.85;
 /// The same in corners whose programs stand other motors by themselves.
 const TURN_SHARE: f64 = 0.93;
-/// By how much of the tolerance the corner itself may be missed: a beam that is within the tolerance
-/// of both legs of a right angle misses it by √2.
+/// By how much of the tolerance the corner itself may be missed: a beam that is within the
+/// tolerance of both legs of a right angle misses it by √2.
 const COVERAGE_SHARE: f64 = 1.35;
 /// Part of the greatest angular acceleration that the beam may have along a mark.
 const ALONG_SHARE: f64 = 0.35;
