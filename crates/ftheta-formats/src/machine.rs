@@ -163,6 +163,7 @@ fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
         power_max_w: section.need("power_max_w", 1e-3..=1e5)?,
         on_latency_ns: nanoseconds(section.number("on_latency_us", 0.0..=1e4)?.unwrap_or(0.0)),
         off_latency_ns: nanoseconds(section.number("off_latency_us", 0.0..=1e4)?.unwrap_or(0.0)),
+        minimum_on_ns: nanoseconds(section.number("minimum_on_us", 0.0..=1e5)?.unwrap_or(0.0)),
         power_modulated: section.boolean("power_modulated")?.unwrap_or(true),
         pulse_khz: section.number("pulse_khz", 0.001..=1e6)?,
     })

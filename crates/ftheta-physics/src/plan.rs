@@ -212,6 +212,7 @@ impl Feed {
             laser.power_max_w,
             laser.on_latency_ns as f64,
             laser.off_latency_ns as f64,
+            laser.minimum_on_ns as f64,
             laser.spot_diameter_mm,
             laser.pulse_khz.unwrap_or(0.0),
             f64::from(output.period_ns),

@@ -211,7 +211,7 @@ fn faults_are_errors_that_name_place_value_and_limit() {
     let fault = |recipe: &Recipe, options: &MarkOptions| {
         run(&machine, recipe, options).err().expect("an error").fault()
     };
-    let options = MarkOptions::default();
+    let options = classic();
     let mut recipe = at_speed(1e9, ClassicRecipe::default());
     let found = fault(&recipe, &options);
     assert_eq!(found.place, "pen \"default\": mark_speed");

@@ -81,7 +81,7 @@ impl<'a> FlyBy<'a> {
         &self,
         from: &States,
         to: &States,
-        heat: &Heat,
+        (n_ticks_min, heat): (usize, &Heat),
     ) -> Result<Option<Voltages>, JumpError> {
         let routes = [0, 1].map(|axis| Route {
             from_rad: self.mirror_row.dot(&from[axis]),
@@ -90,9 +90,11 @@ impl<'a> FlyBy<'a> {
             to_rad_s: self.speed_row.dot(&to[axis]),
         });
         let planned = self.transitions.plan_both(&routes)?;
-        let mut n_fewest = N_TICKS_MIN;
-        if let Some([x, y]) = planned {
-            n_fewest = x.n_ticks().max(N_TICKS_MIN);
+        let n_planned = planned.as_ref().map_or(0, |[x, _]| x.n_ticks());
+        let n_fewest = n_planned.max(N_TICKS_MIN).max(n_ticks_min);
+        if let Some([x, y]) = planned
+            && n_planned == n_fewest
+        {
             let voltages: Voltages =
                 x.voltages_v().zip(y.voltages_v()).map(|(x, y)| [x, y]).collect();
             if let Some(voltages) = self.corrected(voltages, from, to)

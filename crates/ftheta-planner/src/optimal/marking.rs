@@ -93,7 +93,11 @@ impl Marking<'_> {
         [from_centre, to_centre]: [bool; 2],
     ) -> Result<(), PlanError> {
         if from_centre {
-            self.weave.rest_in_centre(N_REST_TICKS);
+            // Long enough for an on edge that comes early.
+            let latency_ns = self.weave.machine.laser.on_latency_ns.max(0) as u64;
+            let period_ns = u64::from(self.weave.machine.output.period_ns);
+            let n_early = latency_ns.div_ceil(period_ns) as u32;
+            self.weave.rest_in_centre(N_REST_TICKS.max(n_early));
         }
         marks.into_iter().try_for_each(|mark| self.mark(mark))?;
         if to_centre && !self.weave.fly_home()? {
@@ -139,6 +143,7 @@ impl Marking<'_> {
         let index = self.weave.draft.marks.len() as u32;
         let place = format!("mark {index} ({})", mark.source);
         let mut limits = *limits;
+        limits.speed_mm_s = limits.speed_mm_s.min(path.length_mm() / self.shortest_light_s());
         for _ in 0..N_SLOWER {
             let stroke = self.laid(&path, &limits, &place)?;
             if self.weave.fly_to(&stroke.pieces[0].laid)? {
@@ -147,6 +152,13 @@ impl Marking<'_> {
             limits.speed_mm_s *= SLOWER;
         }
         Err(PlanError::NoRoom { place })
+    }
+
+    /// Shortest light that the source gives, and whose off edge comes after its on edge, s.
+    fn shortest_light_s(&self) -> f64 {
+        let laser = &self.weave.machine.laser;
+        let ordered_ns = laser.off_latency_ns - laser.on_latency_ns;
+        laser.minimum_on_ns.max(ordered_ns).max(0) as f64 * 1e-9
     }
 
     /// Stretches and turns of a path, in the draft's tables.

@@ -174,7 +174,9 @@ impl<'a> Weave<'a> {
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
         if let Some(from) = &self.states {
             let motion = match self.mover {
-                Mover::Voltage(fly_by) => fly_by.between(from, &to, &self.heat)?,
+                Mover::Voltage(fly_by) => {
+                    fly_by.between(from, &to, (self.dark_ticks(), &self.heat))?
+                }
                 Mover::Angle(glide, _) => glide.between(from, &to),
             };
             let Some(pairs) = motion else {
@@ -184,6 +186,16 @@ impl<'a> Weave<'a> {
         }
         self.states = Some(to);
         Ok(true)
+    }
+
+    /// Fewest ticks between two marks, so that the next on edge comes after the last off edge.
+    fn dark_ticks(&self) -> usize {
+        let laser = &self.machine.laser;
+        let dark_ns = (laser.on_latency_ns - laser.off_latency_ns).max(0) as u64;
+        match self.draft.marks.is_empty() {
+            true => 0,
+            false => dark_ns.div_ceil(u64::from(self.machine.output.period_ns)) as usize + 1,
+        }
     }
 
     /// Appends voltages, or angles.

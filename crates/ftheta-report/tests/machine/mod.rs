@@ -41,6 +41,7 @@ pub fn machine() -> Machine {
             power_max_w: 20.0,
             on_latency_ns: 0,
             off_latency_ns: 0,
+            minimum_on_ns: 0,
             power_modulated: true,
             pulse_khz: None,
         },
