@@ -157,8 +157,8 @@ pub struct Laser {
     pub on_latency_ns: i64,
     /// Light ends after the off edge by this much, ns.
     pub off_latency_ns: i64,
-    /// Shortest light that the source gives as asked, ns: a shorter pulse of the signal gives less or
-    /// none.
+    /// Shortest light that the source gives as asked, ns: a shorter pulse of the signal gives less
+    /// or none.
     pub minimum_on_ns: i64,
     /// Whether power can follow the speed of the beam.
     pub power_modulated: bool,

@@ -31,7 +31,8 @@ fn worst(wanted_rad: impl Fn(f64) -> f64) -> f64 {
         axis.tick(dot(&taps, &around), 0.0);
         if tick > 4000 {
             let mirror_rad = galvo.mirror_row().dot(axis.state());
-            worst_rad = worst_rad.max((mirror_rad - wanted_rad(f64::from(tick + 1) * TICK_S)).abs());
+            worst_rad =
+                worst_rad.max((mirror_rad - wanted_rad(f64::from(tick + 1) * TICK_S)).abs());
         }
     }
     worst_rad
