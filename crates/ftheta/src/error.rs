@@ -93,6 +93,14 @@ pub enum Error {
     /// A jump cannot be planned.
     #[error(transparent)]
     Jump(#[from] JumpError),
+    /// A planner that this machine does not allow.
+    #[error("planner {planner} is not possible on this machine: {why}")]
+    NoPlanner {
+        /// What was asked for.
+        planner: &'static str,
+        /// Why not.
+        why: &'static str,
+    },
     /// The plan is refused.
     #[error(transparent)]
     Audit(#[from] AuditError),
@@ -154,6 +162,9 @@ impl Error {
             Self::Lay(error) => error.fault(),
             Self::Plan(error) => error.fault(),
             Self::Jump(error) => error.fault(),
+            Self::NoPlanner { planner, why } => {
+                ("--planner".into(), (*planner).into(), (*why).into())
+            }
             Self::Audit(error) => error.fault(),
             Self::MotionLaw(error) => error.fault(),
             Self::Mechanism(error) => error.fault(),

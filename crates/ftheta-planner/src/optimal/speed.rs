@@ -12,6 +12,8 @@ use ftheta_model::plan::Knot;
 const ACCELERATION_SHARE: f64 = 1.4;
 /// Steps by which a speed is lowered until bends are passed within the allowance.
 const SLOWER: f64 = 0.9;
+/// Part of the mark speed below which none is tried.
+const SLOWEST: f64 = 1e-3;
 /// Turns below this, rad, are left out: what 32-bit coordinates make of a straight line.
 const TURN_MIN_RAD: f64 = 1e-7;
 
@@ -52,6 +54,7 @@ pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) 
         limits.acceleration_mm_s2.min(ACCELERATION_SHARE * limits.miss_mm / smoothing.variance_s2);
     let turns = turns(path);
     let mut slow: Vec<Limit> = Vec::new();
+    let mut passing = Passing::new(&turns, limits, smoothing, acceleration_mm_s2);
     let mut turning = Turning { first: 0, end: 0, sum_rad: 0.0 };
     let (reach_mm, calm_rad) = (limits.speed_mm_s * smoothing.half_s, calm_rad(limits, smoothing));
     for (index, turn) in turns.iter().enumerate() {
@@ -61,7 +64,7 @@ pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) 
         } else if turned_rad < calm_rad {
             limits.speed_mm_s
         } else {
-            passing_mm_s(&turns, index, limits, smoothing, acceleration_mm_s2)
+            passing.speed_mm_s(index)
         };
         let wait_s = if speed_mm_s == 0.0 { 2.0 * smoothing.half_s } else { 0.0 };
         if speed_mm_s < limits.speed_mm_s {
@@ -129,36 +132,74 @@ impl Turning {
     }
 }
 
-/// Greatest speed past a turn and its neighbours.
-fn passing_mm_s(
-    turns: &[Turn],
-    index: usize,
-    limits: &SpeedLimits,
-    smoothing: &Smoothing,
+/// Speeds that turns are tried at, and what is known of the path.
+struct Passing<'a> {
+    turns: &'a [Turn],
+    limits: &'a SpeedLimits,
+    smoothing: &'a Smoothing,
     acceleration_mm_s2: f64,
-) -> f64 {
-    let mut speed_mm_s = limits.speed_mm_s;
-    loop {
-        let (missed, turned) = weighed(turns, index, speed_mm_s * smoothing.half_s);
-        let sine = (0.5 * missed.abs()).min(std::f64::consts::FRAC_PI_2).sin();
-        let change = 2.0 * (0.5 * turned.abs()).min(std::f64::consts::FRAC_PI_2).sin();
-        let slowest = speed_mm_s < 1e-3 * limits.speed_mm_s;
-        if slowest || change * speed_mm_s <= limits.change_mm_s {
-            let room_mm = limits.miss_mm / sine;
-            if slowest || speed_mm_s * smoothing.mean_s <= room_mm {
-                return speed_mm_s;
-            }
-            // Slower than the mark speed there is acceleration on both sides.
-            let bend_mm = 0.5 * acceleration_mm_s2 * smoothing.variance_s2;
-            let passing = (room_mm - bend_mm) / smoothing.mean_s;
-            if speed_mm_s <= passing {
-                return speed_mm_s;
-            }
-            if passing > 0.5 * speed_mm_s && alone(turns, index, speed_mm_s * smoothing.half_s) {
-                return passing;
-            }
+    /// From the mark speed down.
+    speeds_mm_s: Vec<f64>,
+    /// Index of the speed at which the turn before is passed.
+    before: usize,
+}
+
+impl<'a> Passing<'a> {
+    fn new(
+        turns: &'a [Turn],
+        limits: &'a SpeedLimits,
+        smoothing: &'a Smoothing,
+        acceleration_mm_s2: f64,
+    ) -> Self {
+        let speeds_mm_s = std::iter::successors(Some(limits.speed_mm_s), |speed| {
+            (*speed >= SLOWEST * limits.speed_mm_s).then_some(speed * SLOWER)
+        });
+        let speeds_mm_s = speeds_mm_s.collect();
+        Self { turns, limits, smoothing, acceleration_mm_s2, speeds_mm_s, before: 0 }
+    }
+
+    /// Greatest speed past a turn and its neighbours, tried from that of the turn before on.
+    fn speed_mm_s(&mut self, index: usize) -> f64 {
+        let last = self.speeds_mm_s.len() - 1;
+        let mut at = self.before;
+        let mut found = self.at(index, at);
+        while found.is_none() && at < last {
+            at += 1;
+            found = self.at(index, at);
         }
-        speed_mm_s *= SLOWER;
+        while at > 0
+            && let Some(faster) = self.at(index, at - 1)
+        {
+            at -= 1;
+            found = Some(faster);
+        }
+        self.before = at;
+        found.unwrap_or(self.speeds_mm_s[last])
+    }
+
+    /// The speed at which a turn is passed, if this one, or one that is found from it, does.
+    fn at(&self, index: usize, speed: usize) -> Option<f64> {
+        let Self { turns, limits, smoothing, acceleration_mm_s2, .. } = *self;
+        let speed_mm_s = self.speeds_mm_s[speed];
+        let (missed, turned) = weighed(turns, index, speed_mm_s * smoothing.half_s);
+        let change = 2.0 * (0.5 * turned.abs()).min(std::f64::consts::FRAC_PI_2).sin();
+        if change * speed_mm_s > limits.change_mm_s {
+            return None;
+        }
+        let sine = (0.5 * missed.abs()).min(std::f64::consts::FRAC_PI_2).sin();
+        let room_mm = limits.miss_mm / sine;
+        if speed == 0 && speed_mm_s * smoothing.mean_s <= room_mm {
+            return Some(speed_mm_s);
+        }
+        // Slower than the mark speed there is acceleration on both sides.
+        let bend_mm = 0.5 * acceleration_mm_s2 * smoothing.variance_s2;
+        let passing = (room_mm - bend_mm) / smoothing.mean_s;
+        if speed_mm_s <= passing {
+            return Some(speed_mm_s);
+        }
+        let close = passing > 0.5 * speed_mm_s;
+        let alone = close && alone(turns, index, speed_mm_s * smoothing.half_s);
+        alone.then_some(passing)
     }
 }
 
