@@ -12,6 +12,11 @@ use ftheta_model::plan::Knot;
 const ACCELERATION_SHARE: f64 = 1.4;
 /// Steps by which a speed is lowered until bends are passed within the allowance.
 const SLOWER: f64 = 0.9;
+/// Part of the way averaged over within which slight turns are one.
+const LUMP_SHARE: f64 = 1.0 / 12.0;
+/// A turn that is slight, rad, and the most that several are together.
+const SLIGHT_RAD: f64 = 0.02;
+const LUMP_MAX_RAD: f64 = 0.1;
 /// Part of the mark speed below which none is tried.
 const SLOWEST: f64 = 1e-3;
 /// Turns below this, rad, are left out: what 32-bit coordinates make of a straight line.
@@ -52,7 +57,7 @@ struct Limit {
 pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) -> Vec<Knot> {
     let acceleration_mm_s2 =
         limits.acceleration_mm_s2.min(ACCELERATION_SHARE * limits.miss_mm / smoothing.variance_s2);
-    let turns = turns(path);
+    let turns = turns(path, LUMP_SHARE * limits.speed_mm_s * smoothing.half_s);
     let mut slow: Vec<Limit> = Vec::new();
     let mut passing = Passing::new(&turns, limits, smoothing, acceleration_mm_s2);
     let mut turning = Turning { first: 0, end: 0, sum_rad: 0.0 };
@@ -75,14 +80,17 @@ pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) 
 }
 
 /// Where the path turns, with half of every curved leg's bend counted at each of its ends.
-fn turns(path: &Path) -> Vec<Turn> {
+///
+/// * `lump_mm`: slight turns within it are one
+fn turns(path: &Path, lump_mm: f64) -> Vec<Turn> {
+    let mut first_mm = 0.0;
     let stations = &path.stations;
     let bend = |leg: usize| match path.curved {
         true => angle(stations[leg].leaving, stations[leg + 1].arriving),
         false => 0.0,
     };
     let last = stations.len() - 1;
-    let mut turns = Vec::new();
+    let mut turns: Vec<Turn> = Vec::new();
     for (index, station) in stations.iter().enumerate() {
         let corner_rad = match index {
             0 => 0.0,
@@ -93,10 +101,37 @@ fn turns(path: &Path) -> Vec<Turn> {
         let after = if index < last { bend(index) } else { 0.0 };
         let angle_rad = corner_rad + 0.5 * (before + after);
         if angle_rad.abs() > TURN_MIN_RAD {
-            turns.push(Turn { at_mm: station.distance_mm, angle_rad, corner_rad });
+            let turn = Turn { at_mm: station.distance_mm, angle_rad, corner_rad };
+            match turns.last_mut() {
+                Some(last) if turn.at_mm - first_mm < lump_mm && last.lumps_with(&turn) => {
+                    last.add(&turn);
+                }
+                _ => {
+                    first_mm = turn.at_mm;
+                    turns.push(turn);
+                }
+            }
         }
     }
     turns
+}
+
+impl Turn {
+    /// Whether both are so slight, and to one side, that one of their sum stands for them.
+    fn lumps_with(&self, other: &Self) -> bool {
+        self.angle_rad.abs() < LUMP_MAX_RAD
+            && self.corner_rad.abs() < SLIGHT_RAD
+            && other.angle_rad.abs() < SLIGHT_RAD
+            && self.angle_rad * other.angle_rad > 0.0
+    }
+
+    /// Adds another turn, in the middle of both by their angles.
+    fn add(&mut self, other: &Self) {
+        let sum_rad = self.angle_rad + other.angle_rad;
+        self.at_mm += (other.at_mm - self.at_mm) * (other.angle_rad / sum_rad);
+        self.angle_rad = sum_rad;
+        self.corner_rad = 0.0;
+    }
 }
 
 /// Turns that sum up to less within reach, whatever their sign, are passed at mark speed, rad.
