@@ -126,9 +126,10 @@ impl Chart<'_> {
         let (mut lo, mut hi) =
             values.fold((0.0f64, 0.0f64), |(lo, hi), point| (lo.min(point.1), hi.max(point.1)));
         if let Some(limit) = self.limit {
-            let near = lo.abs().max(hi) > 0.6 * limit;
-            if near {
-                (lo, hi) = (lo.min(-limit), hi.max(limit));
+            if lo.abs().max(hi) > 0.6 * limit {
+                hi = hi.max(limit);
+                // A line that is never below zero has no limit there.
+                lo = if lo < 0.0 { lo.min(-limit) } else { lo };
             }
         }
         let room = 0.06 * (hi - lo).max(1e-12);
