@@ -53,6 +53,7 @@ Examples:
   ftheta mark panel.svg
   ftheta mark logo.svg --machine S14-f255 --fit 80 --speed 2000 --out logo
   ftheta mark text.svg --machine my-machine.toml --recipe steel.toml --mismatch f1=+0.03
+  ftheta mark text.svg --speed 2000 --corner sky --against classic
 
 A file NAME.recipe.toml beside NAME.svg is used unless --recipe names another.")]
 pub struct Mark {
@@ -71,16 +72,18 @@ pub struct Mark {
     #[arg(long, value_enum)]
     pub planner: Option<PlannerName>,
 
-    /// How planned marks take corners; chosen for each one if not given.
+    /// How planned marks take corners; if not given what costs least at each, and as sky where the
+    /// laser can only be on or off.
     #[arg(long, value_enum)]
     pub corner: Option<CornerName>,
     /// Plan the job as classic too, with tuned delays and with skywriting, and compare.
     #[arg(long, value_enum, value_name = "PLANNER")]
     pub against: Option<AgainstName>,
-    /// Part of the voltage that planned jumps keep for the servo's feedback, 0 to 0.9.
+    /// Part of the voltage that planned motion keeps for the servo's feedback, 0 to 0.9.
     #[arg(long, value_name = "R", default_value = "0.12", value_parser = reserve)]
     pub reserve: f64,
-    /// Folder for jump atlases, so that they are built once; the system's cache if not given.
+    /// Folder for what has been solved and tuned, kept for the next run; the system's cache if not
+    /// given.
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
     /// Greatest distance of the beam from a mark, µm.
@@ -313,7 +316,8 @@ pub struct IldaPattern {
     /// Greatest distance of the planned beam from the pattern, µm.
     #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
     pub tolerance_um: f64,
-    /// Folder for jump atlases, so that they are built once; the system's cache if not given.
+    /// Folder for what has been solved and tuned, kept for the next run; the system's cache if not
+    /// given.
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
     /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.

@@ -26,8 +26,8 @@ pub fn curves(out: &mut String, plan: &PlanDraft, states: &[AxisStates]) {
     charts(out, plan, states, "time, ms");
     let zoom = zoomed(plan, states);
     if zoom.len() < states.len() {
-        let from_ms = 1e-6 * zoom[0].time_ns as f64;
-        let length_ms = 1e-6 * (zoom[zoom.len() - 1].time_ns - zoom[0].time_ns) as f64;
+        let from_ms = time_ms(&zoom[0]);
+        let length_ms = time_ms(&zoom[zoom.len() - 1]) - from_ms;
         put(
             out,
             format_args!(
@@ -64,6 +64,11 @@ fn zoomed<'a>(plan: &PlanDraft, states: &'a [AxisStates]) -> &'a [AxisStates] {
     &states[first..(first + ZOOM_STATES).min(states.len())]
 }
 
+/// When it was, ms.
+pub fn time_ms(state: &AxisStates) -> f64 {
+    1e-6 * state.time_ns as f64
+}
+
 /// Reads one quantity of both axes.
 type Quantity = fn(&AxisStates) -> [f64; 2];
 
@@ -75,7 +80,6 @@ fn charts(out: &mut String, plan: &PlanDraft, states: &[AxisStates], x_label: &s
         ("current, A", |s| s.current_a, scanner.current_max_a),
         ("voltage, V", |s| s.voltage_v, scanner.voltage_max_v),
     ];
-    let time_ms = |state: &AxisStates| 1e-6 * state.time_ns as f64;
     let x_range = (time_ms(&states[0]), time_ms(&states[states.len() - 1]));
     for (i, (y_label, quantity, limit)) in rows.into_iter().enumerate() {
         let line = |axis: usize| Series {

@@ -125,11 +125,9 @@ impl Chart<'_> {
         let values = self.series.iter().flat_map(|series| &series.points);
         let (mut lo, mut hi) =
             values.fold((0.0f64, 0.0f64), |(lo, hi), point| (lo.min(point.1), hi.max(point.1)));
-        if let Some(limit) = self.limit {
-            let near = lo.abs().max(hi) > 0.6 * limit;
-            if near {
-                (lo, hi) = (lo.min(-limit), hi.max(limit));
-            }
+        // Symmetric lines have a limit below zero too.
+        if let Some(limit) = self.limit.filter(|limit| lo.abs().max(hi) > 0.6 * limit) {
+            (lo, hi) = (if lo < 0.0 { lo.min(-limit) } else { lo }, hi.max(limit));
         }
         let room = 0.06 * (hi - lo).max(1e-12);
         (lo - room, hi + room)

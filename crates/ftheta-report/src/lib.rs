@@ -16,6 +16,7 @@ mod coverage;
 mod field_view;
 mod histogram;
 mod lettering;
+mod light_view;
 mod line_dose;
 mod plot;
 mod tally;

@@ -5,6 +5,7 @@ use crate::bars::{dose_svg, limits_svg, split_html};
 use crate::cards::cards;
 use crate::comparison::{Rival, comparison};
 use crate::field_view::{error_legend_svg, errors_svg, marks_svg, pens_html};
+use crate::light_view::light;
 use crate::score::Score;
 use crate::text::{escaped, number, put};
 use base64::Engine;
@@ -78,6 +79,7 @@ pub fn report_html(input: &ReportInput<'_>) -> String {
     plate(&mut out, input);
     fields(&mut out, input);
     distributions(&mut out, input);
+    light(&mut out, input.plan, input.states);
     curves(&mut out, input.plan, input.states);
     comparison(&mut out, input);
     tables(&mut out, input);

@@ -138,6 +138,11 @@ const N_STATES: u64 = 100_000;
 /// Most pixels of the dose map's bounding box.
 const N_PIXELS_MAX: f64 = 24e6;
 
+/// Fewest and most pixels across a spot, where memory allows.
+const SPOT_PIXELS: [f64; 2] = [3.0, 12.0];
+/// Pixels along the longer side of a drawing, within these bounds.
+const N_PIXELS_WIDE: f64 = 1200.0;
+
 /// Accuracy of the length of a curve, mm.
 const LENGTH_ACCURACY_MM: f64 = 1e-6;
 
@@ -365,7 +370,8 @@ pub(crate) fn score(
     Ok(scorer.finish())
 }
 
-/// A third of the spot, or coarser where the drawing is so large that memory would not do.
+/// A third of the spot; finer where a small drawing is seen large, coarser where the drawing is so
+/// large that memory would not do.
 fn pixel_mm(plan: &PlanDraft) -> f64 {
     let (mut low, mut high) = (kurbo::Point::ZERO, kurbo::Point::ZERO);
     for (index, &vertex) in plan.vertices.iter().enumerate() {
@@ -375,8 +381,10 @@ fn pixel_mm(plan: &PlanDraft) -> f64 {
             high = kurbo::Point::new(high.x.max(vertex.x), high.y.max(vertex.y));
         }
     }
-    let area_mm2 = (high.x - low.x) * (high.y - low.y);
-    (plan.machine.laser.spot_diameter_mm / 3.0).max((area_mm2 / N_PIXELS_MAX).sqrt())
+    let (width_mm, height_mm) = (high.x - low.x, high.y - low.y);
+    let [coarse_mm, fine_mm] = SPOT_PIXELS.map(|n| plan.machine.laser.spot_diameter_mm / n);
+    let pixel_mm = (width_mm.max(height_mm) / N_PIXELS_WIDE).clamp(fine_mm, coarse_mm);
+    pixel_mm.max((width_mm * height_mm / N_PIXELS_MAX).sqrt())
 }
 
 /// Where the time of a plan goes.

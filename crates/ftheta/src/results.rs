@@ -2,11 +2,15 @@
 
 use crate::Error;
 use crate::against::{Against, WAYS};
-use crate::mark::Marked;
+use crate::mark::{MarkOptions, Marked};
 use crate::output::Output;
+use crate::promise::Promise;
+use ftheta_model::machine::Drive;
+use ftheta_model::plan::Planner;
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::warning::Warning;
 use ftheta_planner::classic::Settings;
+use ftheta_planner::optimal::is_servo_known;
 use ftheta_report::comparison::Rival;
 use ftheta_report::plate::{PlateOptions, plate_png};
 use ftheta_report::report::{ReportInput, TimeSplit, report_html};
@@ -16,6 +20,8 @@ use ftheta_report::report::{ReportInput, TimeSplit, report_html};
 pub struct About<'a> {
     /// Name of the job.
     pub job_name: &'a str,
+    /// How it was marked.
+    pub options: &'a MarkOptions,
     /// Size of the page, mm.
     pub page_mm: [f64; 2],
     /// What the job was compared with.
@@ -67,7 +73,7 @@ fn report(marked: &Marked, about: &About<'_>, plate_png: &[u8]) -> String {
             jump_s: times.jump_s - times.delay_s,
             delay_s: times.delay_s,
         },
-        settings: &settings_rows(marked),
+        settings: &settings_rows(marked, about.options),
         against: &against,
         warnings: about.warnings,
         plate_png,
@@ -84,7 +90,7 @@ fn rivals(against: &Against) -> Vec<Rival<'_>> {
     rivals.collect()
 }
 
-fn settings_rows(marked: &Marked) -> Vec<(String, String)> {
+fn settings_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)> {
     let machine = &marked.plan.machine;
     let laser = &machine.laser;
     let mut rows = vec![
@@ -99,8 +105,42 @@ fn settings_rows(marked: &Marked) -> Vec<(String, String)> {
         rows.insert(1, ("Pulse rate", format!("{pulse_khz} kHz")));
     }
     let rows = rows.into_iter().map(|(key, value)| (key.to_owned(), value));
-    let delays = delay_rows(&marked.settings).into_iter().filter(|(_, value)| value != NONE);
-    rows.chain(delays).collect()
+    let planned = match marked.plan.planner {
+        Planner::Classic => delay_rows(&marked.settings),
+        Planner::Optimal => planned_rows(marked, options),
+    };
+    rows.chain(planned.into_iter().filter(|(_, value)| value != NONE)).collect()
+}
+
+/// What planned motion was planned with, and what it promises.
+fn planned_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)> {
+    let machine = &marked.plan.machine;
+    let known = is_servo_known(machine);
+    let (f1, kt) = (machine.scanner.f1_uncertainty, machine.scanner.kt_uncertainty);
+    let (f1, kt) = (format!("f1 ±{} %", f1 * 100.0), format!("Kt ±{} %", kt * 100.0));
+    let sent = match machine.output.drive {
+        Drive::Voltage => "voltage and state",
+        _ if known => "words, inverse of the servo",
+        _ => "words ahead by the lag",
+    };
+    let transitions = match known {
+        true => format!("held by the servo, {f1}, {kt}"),
+        false => "smooth angles".into(),
+    };
+    let promised = |what: &str, error: fn(&Promise) -> f64| {
+        let value = marked.promise.map(|promise| format!("{:.1} µm", error(&promise) * 1e3));
+        (format!("Contour error promised, {what}"), value.unwrap_or(NONE.into()))
+    };
+    let reserve = format!("{} %", options.reserve * 100.0);
+    vec![
+        ("Corners".into(), options.corner.name().into()),
+        ("Drive".into(), sent.into()),
+        ("Transitions".into(), transitions),
+        ("Voltage reserve".into(), if known { reserve } else { NONE.into() }),
+        promised("as planned", |promise| promise.planned_mm),
+        promised(&f1, |promise| promise.f1_mm),
+        promised(&kt, |promise| promise.kt_mm),
+    ]
 }
 
 /// The settings of a classic controller, for people; what plays no part is a dash.

@@ -32,8 +32,13 @@ pub fn run(arguments: &Circle, as_json: bool) -> Result<(), Error> {
     let mut files = Vec::new();
     if let Some(output) = &mut output {
         let side_mm = 2.2 * radius_mm;
-        let about =
-            About { job_name: "circle", page_mm: [side_mm; 2], warnings: &[], against: None };
+        let about = About {
+            job_name: "circle",
+            options: &options,
+            page_mm: [side_mm; 2],
+            warnings: &[],
+            against: None,
+        };
         files = results::add(output, &circled.marked, &about)?;
     }
     output.map(Output::publish).transpose()?;

@@ -57,6 +57,7 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
         drawing.warnings.iter().chain(&marked.warnings).chain(told).cloned().collect();
     let about = About {
         job_name: &title(arguments),
+        options: &options,
         page_mm: drawing.value.page_mm,
         against: against.as_ref(),
         warnings: &warnings,
