@@ -139,6 +139,8 @@ impl Marking<'_> {
         let index = self.weave.draft.marks.len() as u32;
         let place = format!("mark {index} ({})", mark.source);
         let mut limits = *limits;
+        // Light that ends later than it begins cannot be shorter than that.
+        limits.speed_mm_s = limits.speed_mm_s.min(path.length_mm() / self.light_min_s());
         for _ in 0..N_SLOWER {
             let stroke = self.laid(&path, &limits, &place)?;
             if self.weave.fly_to(&stroke.pieces[0].laid)? {
@@ -350,6 +352,12 @@ impl Marking<'_> {
         path.nearest_mm(&self.weave.places(&piece.laid), &around_mm, near_mm)
     }
 
+    /// Shortest light that the laser can give, s.
+    fn light_min_s(&self) -> f64 {
+        let laser = &self.weave.machine.laser;
+        (1 + laser.off_latency_ns - laser.on_latency_ns).max(1) as f64 * 1e-9
+    }
+
     fn limits(&self, pen: &Pen) -> SpeedLimits {
         let machine = self.weave.machine;
         let scanner = &machine.scanner;
@@ -361,7 +369,10 @@ impl Marking<'_> {
         let coasting_rad_s = COAST_SHARE * voltage_max_v / self.galvo.torque_constant;
         let fastest_rad_s = coasting_rad_s.min(SPEED_SHARE * scanner.speed_max_rad_s);
         let speed_mm_s = pen.mark_speed_mm_s.min(fastest_rad_s * scale);
-        let current_max_a = MARK_SHARE * scanner.current_max_a;
+        // A bend that goes on is a sine on each axis, with half the square of its peak.
+        let sustained_a =
+            (2.0 * self.options.restraint.bend_heat_share).sqrt() * scanner.current_rms_a;
+        let current_max_a = (MARK_SHARE * scanner.current_max_a).min(sustained_a);
         SpeedLimits {
             speed_mm_s,
             acceleration_mm_s2: ALONG_SHARE * most * scale,

@@ -173,9 +173,10 @@ impl<'a> Weave<'a> {
 
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
         if let Some(from) = &self.states {
+            let n_dark = self.n_dark_ticks();
             let motion = match self.mover {
-                Mover::Voltage(fly_by) => fly_by.between(from, &to, &self.heat)?,
-                Mover::Angle(glide, _) => glide.between(from, &to),
+                Mover::Voltage(fly_by) => fly_by.between([from, &to], &self.heat, n_dark)?,
+                Mover::Angle(glide, _) => glide.between(from, &to, n_dark),
             };
             let Some(pairs) = motion else {
                 return Ok(false);
@@ -184,6 +185,15 @@ impl<'a> Weave<'a> {
         }
         self.states = Some(to);
         Ok(true)
+    }
+
+    /// Fewest ticks until a mark may begin, so that the laser is not told of it before it is told
+    /// that the last one ends.
+    fn n_dark_ticks(&self) -> usize {
+        let free_ns = self.draft.marks.last().map_or(0, |mark| mark.off_ns);
+        let light_ns = free_ns as f64 + self.machine.laser.on_latency_ns as f64;
+        let wait_s = light_ns * 1e-9 - self.now_s();
+        (wait_s / self.period_s).ceil().max(0.0) as usize
     }
 
     /// Appends voltages, or angles.
