@@ -46,15 +46,26 @@ pub struct Restraint {
     pub current_reserve: f64,
     /// Part of the voltage that it leaves, of what the user's reserve has left.
     pub voltage_reserve: f64,
+    /// Part of the coil's steady heat that marks may make as long as they bend one way.
+    pub bend_heat_share: f64,
 }
 
 /// In the order to be tried.
 pub const RESTRAINTS: [Restraint; 4] = [
-    Restraint { heat_share: 0.95, current_reserve: 0.02, voltage_reserve: 0.0 },
-    Restraint { heat_share: 0.8, current_reserve: 0.08, voltage_reserve: 0.08 },
-    Restraint { heat_share: 0.6, current_reserve: 0.2, voltage_reserve: 0.2 },
-    Restraint { heat_share: 0.4, current_reserve: 0.4, voltage_reserve: 0.4 },
+    restraint(0.95, 0.02, 0.0, f64::INFINITY),
+    restraint(0.8, 0.08, 0.08, 0.8),
+    restraint(0.6, 0.2, 0.2, 0.6),
+    restraint(0.4, 0.4, 0.4, 0.4),
 ];
+
+const fn restraint(
+    heat_share: f64,
+    current_reserve: f64,
+    voltage_reserve: f64,
+    bend_heat_share: f64,
+) -> Restraint {
+    Restraint { heat_share, current_reserve, voltage_reserve, bend_heat_share }
+}
 
 /// Rest before the first motion and after the last, ticks.
 const N_REST_TICKS: u32 = 4;

@@ -332,3 +332,48 @@ fn a_store_that_cannot_be_written_is_only_warned_of() {
     let marked = run(LINES, &preset("S10-f160"), &stored(&file.join("below"))).unwrap();
     assert!(marked.warnings.iter().any(|warning| warning.to_string().contains("cannot be")));
 }
+
+/// A curve that passes a place straight before it turns there, and one that turns back inside a
+/// segment: every part keeps to its own piece of the curve.
+#[test]
+fn curves_are_cut_where_they_turn() {
+    let elements = r#"<path d="M10 10 H12 C18 10 12 16 12 10 L10 12"/>
+        <path d="M20 10 C24 14 20 14 24 10"/>"#;
+    let options = MarkOptions { corner: Corner::Sky, ..keep() };
+    let marked = run(elements, &preset("S10-f160"), &options).unwrap();
+    assert_eq!(marked.plan.marks.len(), 4);
+    assert!(marked.score.contour_error_um.max < 4.0, "{:?}", marked.score.contour_error_um);
+    assert!(marked.score.coverage_error_um.max < 4.0, "{:?}", marked.score.coverage_error_um);
+}
+
+/// Lasers that begin late are told in time, jumps or not; marks are not shorter than light is.
+#[test]
+fn slow_lasers_get_the_time_that_they_need() {
+    let elements = r#"<path d="M0 0 h1"/><path d="M1.1 0 h1"/><path d="M2.2 0 h0.002"/>"#;
+    for drive in [Drive::ServoKnown, Drive::BlackBox] {
+        for (on_latency_ns, off_latency_ns) in [(1_500_000, 0), (5_000, 200_000)] {
+            let mut machine = preset("S10-f160");
+            machine.output.drive = drive;
+            (machine.laser.on_latency_ns, machine.laser.off_latency_ns) =
+                (on_latency_ns, off_latency_ns);
+            let marked = run(elements, &machine, &keep()).unwrap();
+            assert!(marked.score.contour_error_um.max < 2.0);
+            assert_eq!(marked.score.stray_energy_ratio, 0.0);
+        }
+    }
+}
+
+/// Bends that go on for long are made more slowly where the coils would not stand them.
+#[test]
+fn no_bend_overheats_the_coil() {
+    let circle = "a0.3 0.3 0 0 1 -0.6 0 a0.3 0.3 0 0 1 0.6 0 ".repeat(150);
+    let mut machine = preset("S10-f160");
+    machine.scanner.current_rms_a = 0.8;
+    machine.scanner.thermal_time_s = 0.01;
+    let options = MarkOptions { speed_mm_s: Some(5000.0), ..keep() };
+    let marked = run(&format!(r#"<path d="M10 10 {circle}"/>"#), &machine, &options).unwrap();
+    assert_eq!(marked.plan.planner, Planner::Optimal);
+    let heat = marked.plan.limits().heat;
+    assert!((0.5..1.0).contains(&heat), "heat {heat}");
+    assert!(marked.score.contour_error_um.max < 10.0, "{:?}", marked.score.contour_error_um);
+}

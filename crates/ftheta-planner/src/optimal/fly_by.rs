@@ -75,13 +75,15 @@ impl<'a> FlyBy<'a> {
     /// The voltages from states to states, in the fewest ticks that are known to do, or more where
     /// the coils are hot; `None` if there is no room.
     ///
+    /// * `n_least`: ticks that it takes at least
+    ///
     /// # Errors
     /// If a program fails.
     pub(super) fn between(
         &self,
-        from: &States,
-        to: &States,
-        (n_ticks_min, heat): (usize, &Heat),
+        [from, to]: [&States; 2],
+        heat: &Heat,
+        n_least: usize,
     ) -> Result<Option<Voltages>, JumpError> {
         let routes = [0, 1].map(|axis| Route {
             from_rad: self.mirror_row.dot(&from[axis]),
@@ -90,14 +92,14 @@ impl<'a> FlyBy<'a> {
             to_rad_s: self.speed_row.dot(&to[axis]),
         });
         let planned = self.transitions.plan_both(&routes)?;
-        let n_planned = planned.as_ref().map_or(0, |[x, _]| x.n_ticks());
-        let n_fewest = n_planned.max(N_TICKS_MIN).max(n_ticks_min);
-        if let Some([x, y]) = planned
-            && n_planned == n_fewest
-        {
+        let n_least = n_least.max(N_TICKS_MIN);
+        let mut n_fewest = n_least;
+        if let Some([x, y]) = planned {
+            n_fewest = x.n_ticks().max(n_least);
             let voltages: Voltages =
                 x.voltages_v().zip(y.voltages_v()).map(|(x, y)| [x, y]).collect();
-            if let Some(voltages) = self.corrected(voltages, from, to)
+            if n_fewest == voltages.len()
+                && let Some(voltages) = self.corrected(voltages, from, to)
                 && self.allows(&voltages, from, heat)
             {
                 return Ok(Some(voltages));

@@ -56,8 +56,16 @@ impl Glide {
 
     /// The angles of both axes after each tick, the last one where `to` is; `None` if the angles
     /// leave no room.
-    pub(super) fn between(&self, from: &States, to: &States) -> Option<Vec<[f64; 2]>> {
-        let mut n_ticks = (LAGS_MIN * self.lag_s / self.tick_s).ceil().max(2.0);
+    ///
+    /// * `n_least`: ticks that it takes at least
+    pub(super) fn between(
+        &self,
+        from: &States,
+        to: &States,
+        n_least: usize,
+    ) -> Option<Vec<[f64; 2]>> {
+        let n_lags = (LAGS_MIN * self.lag_s / self.tick_s).ceil().max(2.0);
+        let mut n_ticks = n_lags.max(n_least as f64);
         while n_ticks < N_TICKS_MAX {
             let duration_s = n_ticks * self.tick_s;
             let laws = [0, 1].map(|axis| self.law(&from[axis], &to[axis], duration_s));

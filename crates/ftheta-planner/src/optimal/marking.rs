@@ -143,7 +143,8 @@ impl Marking<'_> {
         let index = self.weave.draft.marks.len() as u32;
         let place = format!("mark {index} ({})", mark.source);
         let mut limits = *limits;
-        limits.speed_mm_s = limits.speed_mm_s.min(path.length_mm() / self.shortest_light_s());
+        // Light that ends later than it begins cannot be shorter than that.
+        limits.speed_mm_s = limits.speed_mm_s.min(path.length_mm() / self.light_min_s());
         for _ in 0..N_SLOWER {
             let stroke = self.laid(&path, &limits, &place)?;
             if self.weave.fly_to(&stroke.pieces[0].laid)? {
@@ -152,13 +153,6 @@ impl Marking<'_> {
             limits.speed_mm_s *= SLOWER;
         }
         Err(PlanError::NoRoom { place })
-    }
-
-    /// Shortest light that the source gives, and whose off edge comes after its on edge, s.
-    fn shortest_light_s(&self) -> f64 {
-        let laser = &self.weave.machine.laser;
-        let ordered_ns = laser.off_latency_ns - laser.on_latency_ns;
-        laser.minimum_on_ns.max(ordered_ns).max(0) as f64 * 1e-9
     }
 
     /// Stretches and turns of a path, in the draft's tables.
@@ -362,6 +356,13 @@ impl Marking<'_> {
         path.nearest_mm(&self.weave.places(&piece.laid), &around_mm, near_mm)
     }
 
+    /// Shortest light that the laser can give, s.
+    fn light_min_s(&self) -> f64 {
+        let laser = &self.weave.machine.laser;
+        let ordered_ns = 1 + laser.off_latency_ns - laser.on_latency_ns;
+        laser.minimum_on_ns.max(ordered_ns).max(1) as f64 * 1e-9
+    }
+
     fn limits(&self, pen: &Pen) -> SpeedLimits {
         let machine = self.weave.machine;
         let scanner = &machine.scanner;
@@ -373,7 +374,10 @@ impl Marking<'_> {
         let coasting_rad_s = COAST_SHARE * voltage_max_v / self.galvo.torque_constant;
         let fastest_rad_s = coasting_rad_s.min(SPEED_SHARE * scanner.speed_max_rad_s);
         let speed_mm_s = pen.mark_speed_mm_s.min(fastest_rad_s * scale);
-        let current_max_a = MARK_SHARE * scanner.current_max_a;
+        // A bend that goes on is a sine on each axis, with half the square of its peak.
+        let sustained_a =
+            (2.0 * self.options.restraint.bend_heat_share).sqrt() * scanner.current_rms_a;
+        let current_max_a = (MARK_SHARE * scanner.current_max_a).min(sustained_a);
         SpeedLimits {
             speed_mm_s,
             acceleration_mm_s2: ALONG_SHARE * most * scale,

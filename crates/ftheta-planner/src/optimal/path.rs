@@ -22,18 +22,21 @@ pub(super) struct Path {
     pub(super) stations: Vec<Station>,
     /// Whether a leg is anything but a straight line.
     pub(super) curved: bool,
+    /// Where on the curve each vertex is: index of the segment plus the parameter in it. Places
+    /// would not tell, since a curve may come back to them.
+    curve_at: Vec<f64>,
 }
 
 impl Path {
     /// The path of a mark; `None` if it has no length.
     pub(super) fn new(mark: &Mark) -> Option<Self> {
         let mut path = Self::default();
-        for segment in mark.curve.segments() {
+        for (index, segment) in mark.curve.segments().enumerate() {
             match segment {
-                PathSeg::Line(line) => path.push_line(line.p1, line.p0),
+                PathSeg::Line(line) => path.push_line(line, index),
                 PathSeg::Quad(_) | PathSeg::Cubic(_) => {
                     path.curved = true;
-                    path.push_curve(&segment, N_HALVINGS_MAX);
+                    path.push_curve(&segment, index as f64, N_HALVINGS_MAX);
                 }
             }
         }
@@ -42,13 +45,9 @@ impl Path {
 
     /// A straight path through points.
     pub(super) fn straight(points: &[Point]) -> Option<Self> {
-        let mut curve = BezPath::new();
-        curve.move_to(*points.first()?);
-        points[1..].iter().for_each(|&point| curve.line_to(point));
         let mut path = Self::default();
-        for segment in curve.segments() {
-            let line: Line = Line::new(segment.start(), segment.end());
-            path.push_line(line.p1, line.p0);
+        for (index, pair) in points.windows(2).enumerate() {
+            path.push_line(Line::new(pair[0], pair[1]), index);
         }
         (path.vertices.len() >= 2).then_some(path)
     }
@@ -58,28 +57,21 @@ impl Path {
         self.stations[self.stations.len() - 1].distance_mm
     }
 
-    /// The paths and curves between vertices, which are corners of the curve.
+    /// The paths and curves between vertices.
     pub(super) fn cut(&self, curve: &BezPath, vertices: &[usize]) -> Vec<(Self, BezPath)> {
-        let mut parts = Vec::with_capacity(vertices.len() + 1);
-        let mut segments = curve.segments().peekable();
-        let mut first = 0;
+        let segments: Vec<PathSeg> = curve.segments().collect();
         let last = self.vertices.len() - 1;
-        for &vertex in vertices.iter().chain([&last]) {
-            let end = self.vertices[vertex];
-            let mut part = Vec::new();
-            while let Some(segment) = segments.next() {
-                part.push(segment);
-                let rest = segments.peek();
-                // The last part takes all that is left.
-                if vertex != last && segment.end().distance(end) <= SAME_PLACE_MM && rest.is_some()
-                {
-                    break;
-                }
-            }
-            parts.push((self.part(first, vertex), BezPath::from_path_segments(part.into_iter())));
-            first = vertex;
-        }
-        parts
+        let (mut first, mut from_at) = (0, 0.0);
+        let mut part = |to: usize| {
+            let to_at = if to == last { segments.len() as f64 } else { self.curve_at[to] };
+            let own = (from_at as usize..segments.len())
+                .take_while(|&index| (index as f64) < to_at)
+                .map(|index| between(segments[index], index as f64, [from_at, to_at]));
+            let part = (self.part(first, to), BezPath::from_path_segments(own));
+            (first, from_at) = (to, to_at);
+            part
+        };
+        vertices.iter().chain([&last]).map(|&vertex| part(vertex)).collect()
     }
 
     /// The part from one vertex to another.
@@ -87,7 +79,12 @@ impl Path {
         let start_mm = self.stations[first].distance_mm;
         let mut stations = self.stations[first..=last].to_vec();
         stations.iter_mut().for_each(|station| station.distance_mm -= start_mm);
-        Self { vertices: self.vertices[first..=last].to_vec(), stations, curved: self.curved }
+        Self {
+            vertices: self.vertices[first..=last].to_vec(),
+            stations,
+            curved: self.curved,
+            curve_at: self.curve_at[first..=last].to_vec(),
+        }
     }
 
     /// Arc lengths of the points nearest to places, each looked for near an arc length, mm.
@@ -140,46 +137,62 @@ impl Path {
         ((from + chord * share - place).hypot2(), start_mm + share * length_mm)
     }
 
-    fn push_line(&mut self, to: Point, from: Point) {
-        let start = *self.vertices.last().unwrap_or(&from);
-        let chord = to - start;
+    fn push_line(&mut self, line: Line, index: usize) {
+        let start = *self.vertices.last().unwrap_or(&line.p0);
+        let chord = line.p1 - start;
         let length_mm = chord.hypot();
         if length_mm > SAME_PLACE_MM {
             let direction = chord / length_mm;
-            self.push(start, direction, to, direction, length_mm);
+            self.push([start, line.p1], [direction; 2], length_mm, (index + 1) as f64);
         }
     }
 
     /// Halves a curve until its parts bend little.
-    fn push_curve(&mut self, curve: &PathSeg, n_halvings: u32) {
+    ///
+    /// * `at`: where on the whole curve it begins
+    fn push_curve(&mut self, curve: &PathSeg, at: f64, n_halvings: u32) {
         let length_mm = curve.arclen(SAME_PLACE_MM);
         if length_mm <= SAME_PLACE_MM {
             return;
         }
         let chord = curve.end() - curve.start();
         let [start, end] = tangents(curve);
+        let share = 0.5_f64.powi((N_HALVINGS_MAX - n_halvings) as i32);
         let bend = angle(start, chord).abs().max(angle(chord, end).abs());
         if n_halvings > 0 && (bend > 0.5 * TURN_MAX_RAD || length_mm > 1.01 * chord.hypot()) {
-            self.push_curve(&curve.subsegment(0.0..0.5), n_halvings - 1);
-            self.push_curve(&curve.subsegment(0.5..1.0), n_halvings - 1);
+            let middle_at = at + 0.5 * share;
+            self.push_curve(&curve.subsegment(0.0..0.5), at, n_halvings - 1);
+            self.push_curve(&curve.subsegment(0.5..1.0), middle_at, n_halvings - 1);
             return;
         }
         let length_mm = curve.arclen((LENGTH_ERROR * length_mm).max(1e-15));
-        self.push(curve.start(), start, curve.end(), end, length_mm.max(chord.hypot()));
+        let length_mm = length_mm.max(chord.hypot());
+        self.push([curve.start(), curve.end()], [start, end], length_mm, at + share);
     }
 
-    fn push(&mut self, from: Point, leaving: Vec2, to: Point, arriving: Vec2, length_mm: f64) {
+    /// * `end_at`: where on the curve the leg ends
+    fn push(&mut self, ends: [Point; 2], directions: [Vec2; 2], length_mm: f64, end_at: f64) {
+        let ([from, to], [leaving, arriving]) = (ends, directions);
         match self.stations.last_mut() {
             Some(last) => last.leaving = leaving,
             None => {
                 self.vertices.push(from);
+                self.curve_at.push(0.0);
                 self.stations.push(Station { arriving: leaving, leaving, distance_mm: 0.0 });
             }
         }
         let distance_mm = self.length_mm() + length_mm;
         self.vertices.push(to);
+        self.curve_at.push(end_at);
         self.stations.push(Station { arriving, leaving: arriving, distance_mm });
     }
+}
+
+/// What of a curve's segment lies between two places of the curve.
+fn between(segment: PathSeg, index: f64, ends_at: [f64; 2]) -> PathSeg {
+    let [from, to] = ends_at.map(|at| (at - index).clamp(0.0, 1.0));
+    // Whole segments stay what they are, to the last bit.
+    if (from, to) == (0.0, 1.0) { segment } else { segment.subsegment(from..to) }
 }
 
 /// Signed angle from one direction to another, rad.

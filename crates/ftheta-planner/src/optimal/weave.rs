@@ -173,11 +173,10 @@ impl<'a> Weave<'a> {
 
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
         if let Some(from) = &self.states {
+            let n_dark = self.n_dark_ticks();
             let motion = match self.mover {
-                Mover::Voltage(fly_by) => {
-                    fly_by.between(from, &to, (self.dark_ticks(), &self.heat))?
-                }
-                Mover::Angle(glide, _) => glide.between(from, &to),
+                Mover::Voltage(fly_by) => fly_by.between([from, &to], &self.heat, n_dark)?,
+                Mover::Angle(glide, _) => glide.between(from, &to, n_dark),
             };
             let Some(pairs) = motion else {
                 return Ok(false);
@@ -188,14 +187,13 @@ impl<'a> Weave<'a> {
         Ok(true)
     }
 
-    /// Fewest ticks between two marks, so that the next on edge comes after the last off edge.
-    fn dark_ticks(&self) -> usize {
-        let laser = &self.machine.laser;
-        let dark_ns = (laser.on_latency_ns - laser.off_latency_ns).max(0) as u64;
-        match self.draft.marks.is_empty() {
-            true => 0,
-            false => dark_ns.div_ceil(u64::from(self.machine.output.period_ns)) as usize + 1,
-        }
+    /// Fewest ticks until a mark may begin, so that the laser is not told of it before it is told
+    /// that the last one ends.
+    fn n_dark_ticks(&self) -> usize {
+        let free_ns = self.draft.marks.last().map_or(0, |mark| mark.off_ns);
+        let light_ns = free_ns as f64 + self.machine.laser.on_latency_ns as f64;
+        let wait_s = light_ns * 1e-9 - self.now_s();
+        (wait_s / self.period_s).ceil().max(0.0) as usize
     }
 
     /// Appends voltages, or angles.
