@@ -204,7 +204,7 @@ fn faulty_settings_name_file_line_and_limit() {
     let error = bench.fault(&["mark", "frame.svg"]);
     assert_eq!((&error["value"], &error["limit"]), (&"50 W".into(), &"0 to 20 W".into()));
     fs::remove_file(bench.path("frame.recipe.toml")).unwrap();
-    let error = bench.fault(&["mark", "frame.svg", "--speed", "1e8"]);
+    let error = bench.fault(&["mark", "frame.svg", "--speed", "1e8", "--planner", "classic"]);
     assert!(error["where"].as_str().unwrap().contains("mark_speed"), "{error}");
     bench.write("a-file", "");
     bench.fault(&["mark", "frame.svg", "--out", "a-file/below"]);
