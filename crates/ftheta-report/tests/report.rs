@@ -203,6 +203,7 @@ fn the_report_is_self_contained_safe_and_bounded() {
     assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("inf "));
     assert!(page.contains("rosette &lt;/script&gt;&lt;b&gt;&amp;&quot;&#39;"));
     assert!(page.contains("#petal5 &lt;script&gt;"));
+    assert!(page.contains("speed, m/s") && page.contains("power, W"));
     assert!(page.contains("data:image/png;base64,"));
     // Its own score as its rival: the same time, and dashes where nothing keeps the tolerance.
     assert!(page.contains("<th class=n>delays &lt;A&gt;<th class=n>delays B"));

@@ -129,7 +129,7 @@ fn planned_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)>
     };
     let promised = |what: &str, error: fn(&Promise) -> f64| {
         let value = marked.promise.map(|promise| format!("{:.1} µm", error(&promise) * 1e3));
-        (format!("Contour error promised, {what}"), value.unwrap_or(NONE.into()))
+        (format!("Promise, {what}"), value.unwrap_or(NONE.into()))
     };
     let reserve = format!("{} %", options.reserve * 100.0);
     vec![
@@ -137,7 +137,7 @@ fn planned_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)>
         ("Drive".into(), sent.into()),
         ("Transitions".into(), transitions),
         ("Voltage reserve".into(), if known { reserve } else { NONE.into() }),
-        promised("as planned", |promise| promise.planned_mm),
+        promised("nominal", |promise| promise.planned_mm),
         promised(&f1, |promise| promise.f1_mm),
         promised(&kt, |promise| promise.kt_mm),
     ]
