@@ -368,7 +368,7 @@ fn slow_lasers_get_the_time_that_they_need() {
 fn no_bend_overheats_the_coil() {
     let circle = "a0.3 0.3 0 0 1 -0.6 0 a0.3 0.3 0 0 1 0.6 0 ".repeat(150);
     let mut machine = preset("S10-f160");
-    machine.scanner.current_rms_a = 0.8;
+    machine.scanner.current_rms_a = 0.15;
     machine.scanner.thermal_time_s = 0.01;
     let options = MarkOptions { speed_mm_s: Some(5000.0), ..keep() };
     let marked = run(&format!(r#"<path d="M10 10 {circle}"/>"#), &machine, &options).unwrap();
