@@ -39,7 +39,7 @@ const SPEED_SHARE: f64 = 0.9 * (1.0 - CORRECTION_RESERVE);
 /// How far a beam's nearest point is from where its speed profile says, in tolerances.
 const NEAR: f64 = 2.0;
 /// Least power, as a part of the pen's, so that light does not end before the mark does.
-const POWER_MIN: f64 = 1e-3;
+const POWER_MIN: f64 = 1e-6;
 
 /// Plans mark after mark.
 pub(super) struct Marking<'a> {
