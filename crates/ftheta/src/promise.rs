@@ -69,7 +69,7 @@ fn worst_mm(plan: &Plan, plant: &Galvo, gains: Gains) -> f64 {
     let period_ns = i64::from(machine.output.period_ns);
     let mut renderer = Renderer::new(plan);
     let mut block = Block::default();
-    let mut lit = Lit { plan, mark: 0, along: None };
+    let mut lit = LitMark { plan, mark: 0, along: None };
     let mut worst_mm = 0.0_f64;
     while renderer.next_block(&mut block) {
         for (index, word) in block.words.iter().enumerate() {
@@ -91,13 +91,13 @@ fn worst_mm(plan: &Plan, plant: &Galvo, gains: Gains) -> f64 {
 }
 
 /// The mark that is lit.
-struct Lit<'a> {
+struct LitMark<'a> {
     plan: &'a Plan,
     mark: usize,
     along: Option<Along>,
 }
 
-impl Lit<'_> {
+impl LitMark<'_> {
     /// The curve that light falls on at a time; times may not fall.
     fn at(&mut self, time_ns: i64) -> Option<&mut Along> {
         let laser = &self.plan.machine.laser;

@@ -4,7 +4,7 @@
 //! with the states as variables every row couples neighbours only.
 
 use super::JumpError;
-use super::axis::Axis;
+use super::axis::{Axis, Weights};
 use super::held::N_DEVIATIONS;
 use crate::convex::{self, Rows};
 use clarabel::solver::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
@@ -280,48 +280,42 @@ impl Program<'_> {
 
     /// Adds how the end of each plant deviates from the nominal one.
     fn deviations(&mut self) {
-        let Self { axis, request, layout, units, rows } = self;
+        let (axis, n_ticks) = (self.axis, self.request.n_ticks);
         for (plant, one) in axis.plants.iter().enumerate() {
             for (position, &to) in DEVIATING.iter().enumerate() {
-                let unit = units.state[to];
-                let ticks = one.deviation(&axis.step, to, request.n_ticks);
-                let from_factor = ticks[0].0.dot(&request.ends.start) * units.factor / unit;
-                let mut entries =
-                    vec![(layout.deviation(plant, position), -1.0), (layout.factor(), from_factor)];
-                for (tick, (weights, gain)) in ticks.iter().enumerate() {
-                    entries.push((layout.voltage(tick), gain * units.voltage / unit));
-                    if tick > 0 {
-                        entries.extend(axis.active.iter().enumerate().map(|(position, &from)| {
-                            (layout.state(tick, position), weights[from] * units.state[from] / unit)
-                        }));
-                    }
-                }
-                rows.add(entries, 0.0);
+                let ticks = one.deviation(&axis.step, to, n_ticks);
+                let column = self.layout.deviation(plant, position);
+                self.deviation(column, self.units.state[to], &ticks);
             }
         }
     }
 
     /// Adds how each held plant deviates at the end.
     fn held_deviations(&mut self) {
-        let Self { axis, request, layout, units, rows } = self;
+        let (axis, n_ticks) = (self.axis, self.request.n_ticks);
         for (plant, one) in axis.held.iter().enumerate() {
             for index in 0..N_DEVIATIONS {
-                let unit = units.deviation(index);
-                let ticks = one.deviation(index, request.n_ticks);
-                let from_factor = ticks[0].0.dot(&request.ends.start) * units.factor / unit;
-                let mut entries =
-                    vec![(layout.held(plant, index), -1.0), (layout.factor(), from_factor)];
-                for (tick, (weights, gain)) in ticks.iter().enumerate() {
-                    entries.push((layout.voltage(tick), gain * units.voltage / unit));
-                    if tick > 0 {
-                        entries.extend(axis.active.iter().enumerate().map(|(position, &from)| {
-                            (layout.state(tick, position), weights[from] * units.state[from] / unit)
-                        }));
-                    }
-                }
-                rows.add(entries, 0.0);
+                let ticks = one.deviation(index, n_ticks);
+                let column = self.layout.held(plant, index);
+                self.deviation(column, self.units.deviation(index), &ticks);
             }
         }
+    }
+
+    /// Adds that a column, in its unit, is the sum of weighted states and voltages of all ticks.
+    fn deviation(&mut self, column: usize, unit: f64, ticks: &[Weights]) {
+        let Self { axis, request, layout, units, rows } = self;
+        let from_factor = ticks[0].0.dot(&request.ends.start) * units.factor / unit;
+        let mut entries = vec![(column, -1.0), (layout.factor(), from_factor)];
+        for (tick, (weights, gain)) in ticks.iter().enumerate() {
+            entries.push((layout.voltage(tick), gain * units.voltage / unit));
+            if tick > 0 {
+                entries.extend(axis.active.iter().enumerate().map(|(position, &from)| {
+                    (layout.state(tick, position), weights[from] * units.state[from] / unit)
+                }));
+            }
+        }
+        rows.add(entries, 0.0);
     }
 
     /// Adds that each held plant is near the nominal mirror at each look.

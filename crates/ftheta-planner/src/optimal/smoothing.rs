@@ -33,7 +33,7 @@ pub(super) struct Smoothing {
 }
 
 impl Smoothing {
-    /// What an unknown servo makes of a corner besides: as if it averaged over half of its lag.
+    /// What an unknown servo makes of a corner besides: as if it averaged, too.
     pub(super) fn with_servo(mut self, lag_s: f64) -> Self {
         let variance_s2 = (SERVO_SHARE * lag_s).powi(2);
         let before_s = self.mean_s / self.variance_s2.sqrt().max(f64::MIN_POSITIVE);

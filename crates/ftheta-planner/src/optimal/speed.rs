@@ -33,7 +33,7 @@ pub(super) struct SpeedLimits {
     pub(super) miss_mm: f64,
     /// Greatest change of velocity at once, mm/s.
     pub(super) change_mm_s: f64,
-    /// Whether to stop in corners that are sharper than `stop_rad`.
+    /// Corners sharper than this are stopped in, rad; infinite for none.
     pub(super) stop_rad: f64,
 }
 
