@@ -46,6 +46,7 @@ fn level(rest: &mut Rest<'_>) -> Result<AtlasLevel, KeptFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kept_file::assert_damage_is_noticed;
 
     fn example() -> (CacheKey, Vec<AtlasLevel>) {
         let level = |step: f64| AtlasLevel {
@@ -65,12 +66,7 @@ mod tests {
     fn every_damage_is_noticed() {
         let (key, levels) = example();
         let whole = write(key, &levels);
-        for n_bytes in 0..whole.len() {
-            assert!(read(&whole[..n_bytes], key).is_err(), "cut to {n_bytes}");
-            let mut flipped = whole.clone();
-            flipped[n_bytes] ^= 0x10;
-            assert!(read(&flipped, key).is_err(), "flipped {n_bytes}");
-        }
+        assert_damage_is_noticed(&whole, |bytes| read(bytes, key).is_err());
         assert_eq!(read(&whole, CacheKey::of("S14")), Err(KeptFileError::Key));
         assert_eq!(read(b"ftheta-atlas 0\n", key), Err(KeptFileError::Header));
     }

@@ -82,3 +82,14 @@ impl<'a> Rest<'a> {
         Ok(self.take(n_bytes)?.chunks_exact(8).map(number).collect())
     }
 }
+
+/// Checks that a file cut anywhere, or with one bit flipped anywhere, is refused.
+#[cfg(test)]
+pub(crate) fn assert_damage_is_noticed(whole: &[u8], is_refused: impl Fn(&[u8]) -> bool) {
+    for n_bytes in 0..whole.len() {
+        assert!(is_refused(&whole[..n_bytes]), "cut to {n_bytes}");
+        let mut flipped = whole.to_vec();
+        flipped[n_bytes] ^= 0x10;
+        assert!(is_refused(&flipped), "flipped {n_bytes}");
+    }
+}
