@@ -8,6 +8,7 @@ pub mod axis_loop;
 pub mod envelope;
 pub mod follow;
 pub mod galvo;
+pub mod head;
 pub mod laser;
 pub mod lossy;
 pub mod map_table;
