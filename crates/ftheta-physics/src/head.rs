@@ -75,7 +75,7 @@ pub struct HeadLens {
     pub ripple_mm: f64,
     /// Distortion at an image height of R where the beam has walked 10 mm off the pupil.
     pub pupil_walk_mm: f64,
-    /// Slope of the chief ray per image height, along x and y: how far the lens is from telecentric.
+    /// Slope of the chief ray per image height, along x and y: how far from telecentric it is.
     pub stretch_per_mm: [f64; 2],
 }
 

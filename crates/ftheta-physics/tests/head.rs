@@ -97,7 +97,8 @@ proptest! {
         let coefficients_mm = vec![420.456, -6.051, 37.397, -55.24];
         let lens = Lens::FTheta { coefficients_mm: coefficients_mm.clone() };
         let optics = Optics { lens, first_mirror: Axis::X, field_mm: 300.0 };
-        let tracer = Tracer::new(&Head::perfect(30.0, 500.0, Some(HeadLens::perfect(coefficients_mm))));
+        let lens = HeadLens::perfect(coefficients_mm);
+        let tracer = Tracer::new(&Head::perfect(30.0, 500.0, Some(lens)));
         let (exact, traced) = (field_from_angles(&optics, angles), tracer.place(angles));
         prop_assert!((exact.x_mm - traced.x_mm).hypot(exact.y_mm - traced.y_mm) < 1e-10);
 

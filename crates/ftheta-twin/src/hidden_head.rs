@@ -140,9 +140,9 @@ mod tests {
         near(head.response[1].gain, 1.0049873935063551);
         near(head.response[1].ripple, 2.8367408577113956e-05);
         let lens = head.lens.unwrap();
-        let expected =
-            [420.59703641157444, 0.0, 8.9519587494553, 0.0, -24.53582183272176, 0.0, -28.706114235441706];
-        lens.coefficients_mm.iter().zip(expected).for_each(|(&found, value)| near(found, value));
+        let odd = [420.59703641157444, 8.9519587494553, -24.53582183272176, -28.706114235441706];
+        let expected = (0..7).map(|k| if k % 2 == 0 { odd[k / 2] } else { 0.0 });
+        lens.coefficients_mm.iter().zip(expected).for_each(|(&c, value)| near(c, value));
         near(lens.tilt_rad[1], 9.599999687669447e-05);
         near(lens.pupil_walk_mm, -0.010179371384442163);
         near(lens.stretch_per_mm[1], 0.0013312696422977058);

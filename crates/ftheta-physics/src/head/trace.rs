@@ -189,7 +189,7 @@ pub fn solve(
         let step = jacobian(angles).try_inverse()? * missing;
         angles = MirrorAngles::new(angles.x_rad + step.x, angles.y_rad + step.y);
         let size = step.amax();
-        if !(size < 1.0) {
+        if !size.is_finite() || size > 1.0 {
             return None;
         }
         if size <= SETTLED_RAD {
