@@ -200,8 +200,9 @@ fn choose(
         let words = surface.as_ref().map_or(String::new(), |s| format!(": {}", s.description()));
         return Ok((model, format!("as asked for{words}"), surface));
     }
-    if clean.len() < N_PHYSICAL {
-        let why = format!("{} marks: the physical model wants {N_PHYSICAL}", clean.len());
+    let n_marks = physical.used.len();
+    if n_marks < N_PHYSICAL {
+        let why = format!("{n_marks} marks: the physical model wants {N_PHYSICAL}");
         return Ok((Model::Scale, why, Some(surface(Family::Scale)?)));
     }
     let rms = |left: &mut dyn Iterator<Item = f64>| Spread::of(left).rms_mm;
