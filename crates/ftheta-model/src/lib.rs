@@ -4,6 +4,7 @@
 //! mm, angles mechanical rad, times s or integer ns; public names carry the unit last.
 
 pub mod block;
+pub mod calibration;
 pub mod dose;
 pub mod flatten;
 pub mod job;
