@@ -2,8 +2,10 @@
 
 pub mod atlas_file;
 pub mod cache_key;
+pub mod cor_file;
 pub mod delays_file;
 mod encoding;
+pub mod grid_csv;
 pub mod kept_file;
 pub mod machine;
 pub mod mechanism;
