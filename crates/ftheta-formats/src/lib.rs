@@ -10,6 +10,7 @@ pub mod kept_file;
 pub mod machine;
 pub mod mechanism;
 pub mod motion_law;
+pub mod pattern_file;
 pub mod plan_file;
 pub mod points;
 pub mod recipe;

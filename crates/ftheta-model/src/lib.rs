@@ -9,6 +9,7 @@ pub mod dose;
 pub mod flatten;
 pub mod job;
 pub mod machine;
+pub mod pattern;
 pub mod plan;
 pub mod recipe;
 pub mod space;

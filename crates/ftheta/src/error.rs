@@ -1,8 +1,11 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use crate::pattern::error::PatternError;
 use ftheta_formats::motion_law::MotionLawError;
+use ftheta_formats::pattern_file::PatternFileError;
 use ftheta_formats::plan_file::PlanFileError;
 use ftheta_formats::svg::error::SvgError;
+use ftheta_formats::text_table::error::TableError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
 use ftheta_physics::mechanism::MechanismError;
@@ -66,6 +69,20 @@ pub enum Error {
     /// A machine or recipe file is at fault.
     #[error(transparent)]
     Toml(#[from] TomlError),
+    /// A table of points or places is at fault.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A pattern cannot be made.
+    #[error(transparent)]
+    Pattern(#[from] PatternError),
+    /// A pattern file is at fault.
+    #[error("{path}: {source}", path = path.display())]
+    PatternFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: PatternFileError,
+    },
     /// A plan file is at fault.
     #[error("{path}: {source}", path = path.display())]
     PlanFile {
@@ -152,6 +169,12 @@ impl Error {
                 (named(path, &place), value, limit)
             }
             Self::Toml(error) => error.fault(),
+            Self::Table(error) => error.fault(),
+            Self::Pattern(error) => error.fault(),
+            Self::PatternFile { path, source } => {
+                let (place, value, limit) = source.fault();
+                (named(path, &place), value, limit)
+            }
             Self::PlanFile { path, source } => {
                 let (place, value, limit) = source.fault();
                 (named(path, &place), value, limit)
