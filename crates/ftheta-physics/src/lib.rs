@@ -5,9 +5,12 @@
 pub mod along;
 pub mod audit;
 pub mod axis_loop;
+pub mod correction;
 pub mod envelope;
 pub mod follow;
 pub mod galvo;
+pub mod grid_map;
+pub mod head;
 pub mod laser;
 pub mod lossy;
 pub mod map_table;

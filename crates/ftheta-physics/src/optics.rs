@@ -70,7 +70,7 @@ pub fn scale_mm_per_rad(optics: &Optics) -> f64 {
 }
 
 /// Image height of the lens polynomial and its slope at `theta_rad`: (mm, mm/rad).
-fn height(coefficients_mm: &[f64], theta_rad: f64) -> (f64, f64) {
+pub(crate) fn height(coefficients_mm: &[f64], theta_rad: f64) -> (f64, f64) {
     let (mut value, mut slope) = (0.0, 0.0);
     for &coefficient in coefficients_mm.iter().rev() {
         // Horner for p(T) = c1 + c2 T + ..., so that h = T · p.

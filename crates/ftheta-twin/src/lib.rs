@@ -3,7 +3,9 @@
 //! It sees only what a device would see, and has parameters of its own.
 
 mod beam;
+mod draw;
 mod exposure;
+pub mod hidden_head;
 mod light;
 pub mod mismatch;
 pub mod open_loop;
