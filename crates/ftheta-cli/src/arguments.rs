@@ -1,9 +1,11 @@
 //! The command line: one struct per command, help texts with an example each.
 
+pub mod field;
 pub mod pattern;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use field::Field;
 use ftheta::jump::{Law, LawError};
 use ftheta::model::plan::Planner;
 use ftheta::planner::optimal::Corner;
@@ -37,7 +39,10 @@ pub enum Command {
     Circle(Circle),
     /// Write a pattern to judge a head by, and show on the twin what comes of it.
     Pattern(Pattern),
-    /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv).
+    /// Map places of the field to mirror angles, and back.
+    Field(Field),
+    /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv), or a
+    /// correction table as another kind of table.
     Convert(Convert),
     /// List, show and check machines.
     Machine(Machine),
@@ -178,12 +183,23 @@ pub struct Jump {
 pub struct Laws(pub Vec<Law>);
 
 #[derive(Args)]
-#[command(after_help = "Example: ftheta convert logo.svg logo-curves.svg --fit 80")]
+#[command(after_help = "\
+Examples:
+  ftheta convert logo.svg logo-curves.svg --fit 80
+  ftheta convert table.txt mine.cor --machine S14-f255
+  ftheta convert mine.cor table.txt --machine S14-f255")]
 pub struct Convert {
-    /// Drawing: .svg or .svgz.
+    /// Drawing: .svg or .svgz. Or a correction table: .txt (ours), .cor (EZCAD) or .csv (a grid of
+    /// offsets).
     pub input: PathBuf,
-    /// File to write: .svg or .csv.
+    /// File to write: .svg or .csv for a drawing; .txt, .cor or .csv for a table.
     pub output: PathBuf,
+    /// Machine of a table: preset (see `ftheta machine list`) or machine file.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub machine: Option<String>,
+    /// Write a .cor file in the older layout, version 1.
+    #[arg(long)]
+    pub cor_1: bool,
     /// Recipe file: text style, pens, hatch.
     #[arg(long, value_name = "FILE")]
     pub recipe: Option<PathBuf>,

@@ -3,9 +3,7 @@
 //! Angles are rad rather than degrees, since a conversion would cost last digits.
 
 use crate::cache_key::hex;
-use ftheta_physics::correction::{
-    About, CorrectionError, CorrectionPlane, CorrectionTable, Drift,
-};
+use ftheta_physics::correction::{About, CorrectionError, CorrectionPlane, CorrectionTable, Drift};
 use ftheta_physics::grid_map::{GridMap, Interpolation};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;

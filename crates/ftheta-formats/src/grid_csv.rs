@@ -51,7 +51,7 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<OffsetGrid, TableError> {
     let table = TextTable::new(file, &text);
     let n_rows = table.rows().count();
     let n_side = n_rows.isqrt();
-    if n_side < 2 || n_side > N_SIDE_MAX || n_side * n_side != n_rows {
+    if !(2..=N_SIDE_MAX).contains(&n_side) || n_side * n_side != n_rows {
         return Err(TableError::NoRows {
             file: file.into(),
             found: format!("{n_rows} rows"),

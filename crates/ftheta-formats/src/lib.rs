@@ -3,6 +3,7 @@
 pub mod atlas_file;
 pub mod cache_key;
 pub mod cor_file;
+pub mod correction_file;
 pub mod delays_file;
 mod encoding;
 pub mod grid_csv;

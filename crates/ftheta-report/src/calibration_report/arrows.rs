@@ -18,10 +18,11 @@ pub fn before_and_after(out: &mut String, input: &CalibrationReportInput<'_>) {
     if points.is_empty() {
         return;
     }
-    let [before, after] =
-        [|point: &ReportPoint| point.error_before_mm, |p| p.error_after_mm].map(|error| {
-            exaggeration(&points, error).map(|scale| (picture(&points, error, scale), scale))
-        });
+    let drawn = |error: fn(&ReportPoint) -> [f64; 2]| {
+        exaggeration(&points, error).map(|scale| (picture(&points, error, scale), scale))
+    };
+    let before = drawn(|point| point.error_before_mm);
+    let after = drawn(|point| point.error_after_mm);
     out.push_str("<div class=pair>");
     for (name, drawn) in [("Errors before", before), ("Errors after", after)] {
         put(out, format_args!("<section><h2>{name}</h2>"));

@@ -105,7 +105,7 @@ fn sizes(options: &GridOptions, machine: &Machine) -> Result<Sizes, PatternError
         return Err(PatternError::TooSmall { size_mm, spot_mm, limit_mm });
     }
     let (reach_mm, limit_mm) = (field_mm + size_mm, machine.optics.field_mm);
-    if reach_mm > limit_mm {
+    if reach_mm > limit_mm || reach_mm.is_nan() {
         return Err(PatternError::Field { field_mm, size_mm, reach_mm, limit_mm });
     }
     let gap_mm = match options.style {

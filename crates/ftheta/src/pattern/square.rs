@@ -27,7 +27,7 @@ pub fn sheet(
     machine: &Machine,
 ) -> Result<Sheet, PatternError> {
     let limit_mm = machine.optics.field_mm;
-    if field_mm > limit_mm {
+    if field_mm > limit_mm || field_mm.is_nan() {
         return Err(PatternError::Field { field_mm, size_mm: 0.0, reach_mm: field_mm, limit_mm });
     }
     let half_mm = 0.5 * field_mm;
@@ -56,7 +56,7 @@ pub fn sheet(
         curves.push((name.to_owned(), path));
     }
     let gap_mm = SIGN_GAP * field_mm;
-    let bounds = Rect::from_origin_size((gap_mm, gap_mm), [SIGN * field_mm; 2]);
+    let bounds = Rect::from_origin_size((gap_mm, gap_mm), (SIGN * field_mm, SIGN * field_mm));
     let layers =
         vec![sheet::layer("square", curves), sheet::layer("sign", sheet::axes_sign(bounds))];
     let pattern = Pattern {
