@@ -1,12 +1,17 @@
 //! The command line: one struct per command, help texts with an example each.
 
+pub mod field;
+pub mod pattern;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use field::Field;
 use ftheta::jump::{Law, LawError};
 use ftheta::model::plan::Planner;
 use ftheta::planner::optimal::Corner;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
+use pattern::Pattern;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -34,7 +39,10 @@ pub enum Command {
     Circle(Circle),
     /// Write a pattern to judge a head by, and show on the twin what comes of it.
     Pattern(Pattern),
-    /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv).
+    /// Map places of the field to mirror angles, and back.
+    Field(Field),
+    /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv), or a
+    /// correction table as another kind of table.
     Convert(Convert),
     /// List, show and check machines.
     Machine(Machine),
@@ -175,12 +183,23 @@ pub struct Jump {
 pub struct Laws(pub Vec<Law>);
 
 #[derive(Args)]
-#[command(after_help = "Example: ftheta convert logo.svg logo-curves.svg --fit 80")]
+#[command(after_help = "\
+Examples:
+  ftheta convert logo.svg logo-curves.svg --fit 80
+  ftheta convert table.txt mine.cor --machine S14-f255
+  ftheta convert mine.cor table.txt --machine S14-f255")]
 pub struct Convert {
-    /// Drawing: .svg or .svgz.
+    /// Drawing: .svg or .svgz. Or a correction table: .txt (ours), .cor (EZCAD) or .csv (a grid of
+    /// offsets).
     pub input: PathBuf,
-    /// File to write: .svg or .csv.
+    /// File to write: .svg or .csv for a drawing; .txt, .cor or .csv for a table.
     pub output: PathBuf,
+    /// Machine of a table: preset (see `ftheta machine list`) or machine file.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub machine: Option<String>,
+    /// Write a .cor file in the older layout, version 1.
+    #[arg(long)]
+    pub cor_1: bool,
     /// Recipe file: text style, pens, hatch.
     #[arg(long, value_name = "FILE")]
     pub recipe: Option<PathBuf>,
@@ -275,55 +294,6 @@ pub struct Circle {
     /// Folder for report.html, mark.png and plan.ftheta.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-}
-
-#[derive(Args)]
-pub struct Pattern {
-    #[command(subcommand)]
-    pub kind: PatternKind,
-}
-
-#[derive(Subcommand)]
-pub enum PatternKind {
-    /// The ILDA test pattern: planned, beside what comes of its points played at a constant rate.
-    Ilda(IldaPattern),
-}
-
-#[derive(Args)]
-#[command(allow_negative_numbers = true)]
-#[command(
-    after_help = "Example: ftheta pattern ilda --machine S10-f160 --out ilda.svg --report ilda"
-)]
-pub struct IldaPattern {
-    /// Preset (see `ftheta machine list`) or machine file.
-    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
-    pub machine: String,
-    /// Side of the pattern, mm; eight optical degrees if not given.
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    pub field: Option<f64>,
-    /// Drawing to write, .svg; the features' nominal places go beside it, .json.
-    #[arg(long, value_name = "FILE")]
-    pub out: PathBuf,
-    /// Folder for pattern.html and plan.ftheta.
-    #[arg(long, value_name = "DIR")]
-    pub report: Option<PathBuf>,
-    /// Speed at which the pattern is planned, mm/s.
-    #[arg(long, value_name = "MM_S", default_value = "3000", value_parser = positive)]
-    pub speed: f64,
-    /// Rate at which its points are played, 1/s.
-    #[arg(long, value_name = "N", default_value = "30000", value_parser = rate)]
-    pub points_per_s: f64,
-    /// Greatest distance of the planned beam from the pattern, µm.
-    #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
-    pub tolerance_um: f64,
-    /// Folder for what has been solved and tuned, kept for the next run; the system's cache if not
-    /// given.
-    #[arg(long, value_name = "DIR")]
-    pub cache: Option<PathBuf>,
-    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.
-    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
-          value_parser = mismatch, allow_hyphen_values = true)]
-    pub mismatch: Mismatch,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

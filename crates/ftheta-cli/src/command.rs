@@ -2,6 +2,7 @@
 
 pub mod circle;
 pub mod convert;
+pub mod field;
 pub mod jump;
 pub mod machine;
 pub mod mark;

@@ -152,6 +152,11 @@ fn twin(score: &Score) -> Value {
     })
 }
 
+/// Files that were written: kind and path.
+pub fn files(files: &[(&str, String)]) -> Value {
+    object(files)
+}
+
 fn object<T: Clone + Into<Value>>(rows: &[(&str, T)]) -> Value {
     rows.iter().map(|(key, value)| ((*key).to_owned(), value.clone().into())).collect()
 }

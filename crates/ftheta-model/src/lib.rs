@@ -4,10 +4,12 @@
 //! mm, angles mechanical rad, times s or integer ns; public names carry the unit last.
 
 pub mod block;
+pub mod calibration;
 pub mod dose;
 pub mod flatten;
 pub mod job;
 pub mod machine;
+pub mod pattern;
 pub mod plan;
 pub mod recipe;
 pub mod space;

@@ -6,12 +6,15 @@ use crate::text::{number, put, time};
 use ftheta_physics::audit::Limits;
 
 /// A figure at the top of the page.
-struct Card {
-    name: &'static str,
-    value: String,
-    more: String,
+pub struct Card {
+    /// What it is.
+    pub name: &'static str,
+    /// Its value; one unit behind a blank is written smaller.
+    pub value: String,
+    /// What else there is to know.
+    pub more: String,
     /// Whether it is as it should be, where that can be told.
-    good: Option<bool>,
+    pub good: Option<bool>,
 }
 
 /// Appends the five figures that matter most.
@@ -41,6 +44,11 @@ pub fn cards(out: &mut String, input: &ReportInput<'_>) {
         dose_card(score),
         limits_card(input.peaks),
     ];
+    draw(out, cards);
+}
+
+/// Appends five figures side by side.
+pub fn draw(out: &mut String, cards: [Card; 5]) {
     out.push_str("<div class=cards>");
     for card in cards {
         let class = match card.good {

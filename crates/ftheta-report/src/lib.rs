@@ -1,5 +1,6 @@
 //! What the beam did against what was asked: figures, picture and report.
 
+pub mod calibration_report;
 pub mod jump_report;
 pub mod pattern_report;
 pub mod plate;
@@ -13,6 +14,7 @@ mod chart;
 pub mod comparison;
 mod contour;
 mod coverage;
+mod field_frame;
 mod field_view;
 mod histogram;
 mod lettering;

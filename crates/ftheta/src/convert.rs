@@ -24,6 +24,17 @@ pub fn write(job: &Job, recipe: &Recipe, path: &Path) -> Result<(), Error> {
     write_file(path, content.as_bytes())
 }
 
+/// Checks that a drawing is to be written to a file of its kind.
+///
+/// # Errors
+/// If its name does not end in `.svg`.
+pub fn check_svg(path: &Path) -> Result<(), Error> {
+    match path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
+        true => Ok(()),
+        false => Err(Error::Format { path: path.into(), expected: ".svg to write" }),
+    }
+}
+
 fn polylines(job: &Job, recipe: &Recipe) -> Result<String, Error> {
     let options = LayOptions {
         flatten_tolerance_mm: recipe.flatten_tolerance_mm.unwrap_or(0.002),

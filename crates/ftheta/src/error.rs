@@ -1,8 +1,15 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use crate::exchange::ExchangeError;
+use crate::field::FieldError;
+use crate::pattern::error::PatternError;
+use ftheta_formats::cor_file::CorFileError;
+use ftheta_formats::correction_file::CorrectionFileError;
 use ftheta_formats::motion_law::MotionLawError;
+use ftheta_formats::pattern_file::PatternFileError;
 use ftheta_formats::plan_file::PlanFileError;
 use ftheta_formats::svg::error::SvgError;
+use ftheta_formats::text_table::error::TableError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
 use ftheta_physics::mechanism::MechanismError;
@@ -55,6 +62,12 @@ pub enum Error {
         /// What there is.
         presets: String,
     },
+    /// A table without the machine that it is for.
+    #[error("{path}: a correction table is for one machine, name it with --machine", path = path.display())]
+    NeedsMachine {
+        /// The table.
+        path: PathBuf,
+    },
     /// A drawing is at fault.
     #[error("{path}: {source}", path = path.display())]
     Svg {
@@ -66,6 +79,52 @@ pub enum Error {
     /// A machine or recipe file is at fault.
     #[error(transparent)]
     Toml(#[from] TomlError),
+    /// A table of points or places is at fault.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A correction file is at fault, or for another machine.
+    #[error("{path}: {source}", path = path.display())]
+    CorrectionFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: CorrectionFileError,
+    },
+    /// A `.cor` file is at fault.
+    #[error("{path}: {source}", path = path.display())]
+    CorFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: CorFileError,
+    },
+    /// A correction table cannot be taken from or put into another kind of file.
+    #[error("{path}: {source}", path = path.display())]
+    Exchange {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: ExchangeError,
+    },
+    /// A place of a list has no angles, or angles no place.
+    #[error("{path}: {source}", path = path.display())]
+    Field {
+        /// The list.
+        path: PathBuf,
+        /// What is wrong.
+        source: FieldError,
+    },
+    /// A pattern cannot be made.
+    #[error(transparent)]
+    Pattern(#[from] PatternError),
+    /// A pattern file is at fault.
+    #[error("{path}: {source}", path = path.display())]
+    PatternFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: PatternFileError,
+    },
     /// A plan file is at fault.
     #[error("{path}: {source}", path = path.display())]
     PlanFile {
@@ -147,15 +206,19 @@ impl Error {
             Self::NoMachine { name, presets } => {
                 ("--machine".into(), name.clone(), presets.clone())
             }
-            Self::Svg { path, source } => {
-                let (place, value, limit) = source.fault();
-                (named(path, &place), value, limit)
+            Self::NeedsMachine { path } => {
+                (path.display().to_string(), "no --machine".into(), "a preset or a file".into())
             }
+            Self::Svg { path, source } => in_file(path, source.fault()),
             Self::Toml(error) => error.fault(),
-            Self::PlanFile { path, source } => {
-                let (place, value, limit) = source.fault();
-                (named(path, &place), value, limit)
-            }
+            Self::Table(error) => error.fault(),
+            Self::Pattern(error) => error.fault(),
+            Self::CorrectionFile { path, source } => in_file(path, source.fault()),
+            Self::CorFile { path, source } => in_file(path, source.fault()),
+            Self::Exchange { path, source } => in_file(path, source.fault()),
+            Self::Field { path, source } => in_file(path, source.fault()),
+            Self::PatternFile { path, source } => in_file(path, source.fault()),
+            Self::PlanFile { path, source } => in_file(path, source.fault()),
             Self::PlanId { path, found, claimed } => {
                 (path.display().to_string(), found.clone(), claimed.clone())
             }
@@ -175,8 +238,11 @@ impl Error {
     }
 }
 
-/// A place in a file, or the file alone.
-fn named(path: &Path, place: &str) -> String {
+/// Place, value and limit of a fault in a file.
+fn in_file(
+    path: &Path,
+    (place, value, limit): (String, String, String),
+) -> (String, String, String) {
     let path = path.display();
-    if place.is_empty() { path.to_string() } else { format!("{path}: {place}") }
+    (if place.is_empty() { path.to_string() } else { format!("{path}: {place}") }, value, limit)
 }

@@ -8,6 +8,8 @@ pub mod atlas_store;
 pub mod circle;
 pub mod convert;
 pub mod error;
+pub mod exchange;
+pub mod field;
 pub mod import;
 pub mod jump;
 pub mod jump_results;
@@ -20,6 +22,7 @@ pub mod pattern;
 mod planning;
 pub mod promise;
 pub mod results;
+pub mod tables;
 pub mod verify;
 
 pub use error::{Error, Fault};

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
 use ftheta::mark::MarkOptions;
-use ftheta::pattern::{CIRCLE_GAIN, Ilda, PatternOptions, compare, tuned_rate};
+use ftheta::pattern::ilda::{CIRCLE_GAIN, Ilda, PatternOptions, compare, tuned_rate};
 use ftheta_formats::machine::preset;
 use ftheta_model::recipe::Pen;
 

@@ -1,22 +1,88 @@
 //! `ftheta pattern`: patterns to judge or calibrate a head by.
 
-use crate::arguments::{IldaPattern, Pattern, PatternKind};
+use crate::arguments::pattern::{
+    GridPattern, IldaPattern, Pattern, PatternKind, SheetArguments, SquarePattern,
+};
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::say;
 use ftheta::atlas_store::AtlasStore;
+use ftheta::formats::pattern_file;
 use ftheta::mark::MarkOptions;
+use ftheta::model::machine::Machine;
 use ftheta::model::recipe::Pen;
 use ftheta::output::{Output, write_file};
-use ftheta::pattern::{Comparison, Feature, Ilda, PatternOptions, Way, compare};
+use ftheta::pattern::grid::{self, GridOptions};
+use ftheta::pattern::ilda::{Comparison, Ilda, PatternOptions, Way, compare};
+use ftheta::pattern::sheet::{Sheet, SheetProcess};
+use ftheta::pattern::square;
 use ftheta::{Error, convert, machines};
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// Writes a pattern and shows what comes of it.
 pub fn run(arguments: &Pattern, as_json: bool) -> Result<(), Error> {
     match &arguments.kind {
+        PatternKind::Grid(grid) => run_grid(grid, as_json),
+        PatternKind::Square(square) => run_square(square, as_json),
         PatternKind::Ilda(ilda) => run_ilda(ilda, as_json),
     }
+}
+
+fn run_grid(arguments: &GridPattern, as_json: bool) -> Result<(), Error> {
+    let SheetArguments { machine, field, speed, power_w, out } = &arguments.sheet;
+    let machine = machines::find(machine)?;
+    let process = process(&machine, *speed, *power_w);
+    let options = GridOptions {
+        n_side: arguments.points,
+        field_mm: *field,
+        style: arguments.mark.into(),
+        size_mm: arguments.size_mm,
+        process,
+    };
+    write_sheet(&grid::sheet(&options, &machine)?, out, as_json)
+}
+
+fn run_square(arguments: &SquarePattern, as_json: bool) -> Result<(), Error> {
+    let SheetArguments { machine, field, speed, power_w, out } = &arguments.sheet;
+    let machine = machines::find(machine)?;
+    let process = process(&machine, *speed, *power_w);
+    write_sheet(&square::sheet(*field, &process, &machine)?, out, as_json)
+}
+
+/// The machine's usual settings, changed where the user says so.
+fn process(machine: &Machine, speed: Option<f64>, power_w: Option<f64>) -> SheetProcess {
+    let usual = SheetProcess::of(machine);
+    SheetProcess {
+        speed_mm_s: speed.unwrap_or(usual.speed_mm_s),
+        power_w: power_w.unwrap_or(usual.power_w),
+    }
+}
+
+fn write_sheet(sheet: &Sheet, out: &Path, as_json: bool) -> Result<(), Error> {
+    let files = sheet.write(out)?;
+    let pattern = &sheet.pattern;
+    if as_json {
+        json::print(&json!({
+            "kind": pattern.kind,
+            "machine": pattern.machine,
+            "field_mm": pattern.field_mm,
+            "features": pattern.features.len(),
+            "points": sheet.places.len(),
+            "files": json::files(&files),
+        }));
+        return Ok(());
+    }
+    say!(
+        "pattern  {}, {} mm, {} places to measure",
+        pattern.kind,
+        pattern.field_mm,
+        sheet.places.len()
+    );
+    for (kind, path) in files {
+        say!("{kind:8} {path}");
+    }
+    Ok(())
 }
 
 fn run_ilda(arguments: &IldaPattern, as_json: bool) -> Result<(), Error> {
@@ -35,8 +101,8 @@ fn run_ilda(arguments: &IldaPattern, as_json: bool) -> Result<(), Error> {
     let compared = compare(&ilda, &machine, &options, &mut |stage| progress.observe(stage))?;
     convert::write(&ilda.job(options.pen), &Default::default(), &arguments.out)?;
     let features = arguments.out.with_extension("json");
-    let described = description(&ilda, &machine.name, arguments.speed);
-    write_file(&features, described.to_string().as_bytes())?;
+    let pattern = ilda.pattern(&machine, arguments.speed);
+    write_file(&features, pattern_file::write(&pattern).as_bytes())?;
     let mut files = vec![
         ("drawing", arguments.out.display().to_string()),
         ("features", features.display().to_string()),
@@ -53,30 +119,6 @@ fn run_ilda(arguments: &IldaPattern, as_json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Every feature's nominal place.
-fn description(ilda: &Ilda, machine: &str, speed_mm_s: f64) -> Value {
-    let mut features = Vec::new();
-    for (name, parts) in ilda.strokes() {
-        for (index, part) in parts.iter().enumerate() {
-            let id = if parts.len() > 1 { format!("{name}-{}", index + 1) } else { name.into() };
-            features.push(match part {
-                Feature::Line(line) => json!({
-                    "id": id, "kind": "line",
-                    "x1_mm": line.p0.x, "y1_mm": line.p0.y,
-                    "x2_mm": line.p1.x, "y2_mm": line.p1.y,
-                    "speed_mm_s": speed_mm_s, "power_ratio": 1.0,
-                }),
-                Feature::Circle(circle) => json!({
-                    "id": id, "kind": "circle",
-                    "x_mm": circle.center.x, "y_mm": circle.center.y, "radius_mm": circle.radius,
-                    "speed_mm_s": speed_mm_s, "power_ratio": 1.0,
-                }),
-            });
-        }
-    }
-    json!({"kind": "ilda", "field_mm": ilda.side_mm(), "machine": machine, "features": features})
-}
-
 fn object(ilda: &Ilda, compared: &Comparison, files: &[(&str, String)]) -> Value {
     let way = |way: &Way| {
         json!({
@@ -89,14 +131,13 @@ fn object(ilda: &Ilda, compared: &Comparison, files: &[(&str, String)]) -> Value
             "circle_ratio": way.traced.circle_ratio,
         })
     };
-    let files: Value = files.iter().map(|(kind, path)| ((*kind).to_owned(), json!(path))).collect();
     json!({
         "machine": compared.planned.plan.machine.name,
         "field_mm": ilda.side_mm(),
         "ilda_points_per_s": compared.tuned_rate,
         "planned": way(&compared.ways[0]),
         "played": compared.ways[1..].iter().map(way).collect::<Vec<_>>(),
-        "files": files,
+        "files": json::files(files),
     })
 }
 

@@ -2,6 +2,7 @@
 
 use super::Limits;
 use super::error::SvgError;
+use crate::encoding;
 use std::borrow::Cow;
 use std::io::Read;
 
@@ -25,11 +26,13 @@ fn plain_text<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Cow<'a, str>, SvgE
     if limits.n_bytes_max < bytes.len() {
         return Err(SvgError::TooLarge { n_bytes: bytes.len(), limit: limits.n_bytes_max });
     }
-    let text = match bytes {
-        [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest)?,
-        [0xff, 0xfe, rest @ ..] => Cow::Owned(utf16(rest, u16::from_le_bytes)?),
-        [0xfe, 0xff, rest @ ..] => Cow::Owned(utf16(rest, u16::from_be_bytes)?),
-        _ => utf8(bytes)?,
+    let text = match encoding::text(bytes) {
+        Ok(text) => text,
+        // Each byte of Latin-1 is the code point of the same number.
+        Err(_) if declares_latin1(bytes) => {
+            Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect())
+        }
+        Err(offset) => return Err(SvgError::NotText { offset }),
     };
     if text.trim().is_empty() {
         return Err(SvgError::Empty);
@@ -47,27 +50,7 @@ fn unpack(bytes: &[u8], limits: &Limits) -> Result<Vec<u8>, SvgError> {
     Ok(unpacked)
 }
 
-fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, SvgError> {
-    match str::from_utf8(bytes) {
-        Ok(text) => Ok(Cow::Borrowed(text)),
-        // Each byte of Latin-1 is the code point of the same number.
-        Err(_) if declares_latin1(bytes) => {
-            Ok(Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()))
-        }
-        Err(error) => Err(SvgError::NotText { offset: error.valid_up_to() }),
-    }
-}
-
 fn declares_latin1(bytes: &[u8]) -> bool {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).to_ascii_lowercase();
     head.starts_with("<?xml") && (head.contains("iso-8859-1") || head.contains("windows-1252"))
-}
-
-fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<String, SvgError> {
-    let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
-    let text: Result<String, _> = char::decode_utf16(units).collect();
-    match text {
-        Ok(text) if bytes.len().is_multiple_of(2) => Ok(text),
-        _ => Err(SvgError::NotText { offset: 2 }),
-    }
 }

@@ -1,0 +1,141 @@
+//! Arguments of `ftheta pattern`.
+
+use super::{mismatch, positive, rate};
+use clap::{Args, Subcommand, ValueEnum};
+use ftheta::model::pattern::MarkStyle;
+use ftheta::pattern::grid::N_SIDE_MAX;
+use ftheta::twin::mismatch::Mismatch;
+use std::path::PathBuf;
+
+#[derive(Args)]
+pub struct Pattern {
+    #[command(subcommand)]
+    pub kind: PatternKind,
+}
+
+#[derive(Subcommand)]
+pub enum PatternKind {
+    /// A grid of crosses or dots with labels, and a table to fill in: what `ftheta calibrate field`
+    /// needs.
+    Grid(GridPattern),
+    /// A square with a cross through its centre: nine places for a ruler.
+    Square(SquarePattern),
+    /// The ILDA test pattern: planned, beside what comes of its points played at a constant rate.
+    Ilda(IldaPattern),
+}
+
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(
+    after_help = "Example: ftheta pattern ilda --machine S10-f160 --out ilda.svg --report ilda"
+)]
+pub struct IldaPattern {
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Side of the pattern, mm; eight optical degrees if not given.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub field: Option<f64>,
+    /// Drawing to write, .svg; the features' nominal places go beside it, .json.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Folder for pattern.html and plan.ftheta.
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Speed at which the pattern is planned, mm/s.
+    #[arg(long, value_name = "MM_S", default_value = "3000", value_parser = positive)]
+    pub speed: f64,
+    /// Rate at which its points are played, 1/s.
+    #[arg(long, value_name = "N", default_value = "30000", value_parser = rate)]
+    pub points_per_s: f64,
+    /// Greatest distance of the planned beam from the pattern, µm.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
+    pub tolerance_um: f64,
+    /// Folder for what has been solved and tuned, kept for the next run; the system's cache if not
+    /// given.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.
+    #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
+          value_parser = mismatch, allow_hyphen_values = true)]
+    pub mismatch: Mismatch,
+}
+
+#[derive(Args)]
+pub struct SheetArguments {
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Distance of the outermost places, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub field: f64,
+    /// Speed of the beam, mm/s; 1000 if not given.
+    #[arg(long, value_name = "MM_S", value_parser = positive)]
+    pub speed: Option<f64>,
+    /// Power, W; 10, or what the laser has, if not given.
+    #[arg(long, value_name = "W", value_parser = positive)]
+    pub power_w: Option<f64>,
+    /// Drawing to write, .svg; beside it go the nominal places (.json), the table to fill in (.csv)
+    /// and the recipe (.recipe.toml).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(after_help = "\
+Examples:
+  ftheta pattern grid --machine S14-f420 --points 25 --field 280 --out grid.svg
+  ftheta mark grid.svg --machine S14-f420")]
+pub struct GridPattern {
+    #[command(flatten)]
+    pub sheet: SheetArguments,
+    /// Number of marks: the square of an odd number, 9 to 4225.
+    #[arg(long, value_name = "N", value_parser = n_side)]
+    pub points: u32,
+    /// Crosses or dots.
+    #[arg(long, value_enum, default_value = "cross")]
+    pub mark: MarkName,
+    /// From tip to tip of a cross, or diameter of a dot, mm; derived from their distance if not
+    /// given.
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub size_mm: Option<f64>,
+}
+
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(
+    after_help = "Example: ftheta pattern square --machine S14-f420 --field 280 --out square.svg"
+)]
+pub struct SquarePattern {
+    #[command(flatten)]
+    pub sheet: SheetArguments,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum MarkName {
+    /// Two lines: found best in pictures and with a ruler.
+    Cross,
+    /// A filled disc.
+    Dot,
+}
+
+impl From<MarkName> for MarkStyle {
+    fn from(name: MarkName) -> Self {
+        match name {
+            MarkName::Cross => Self::Cross,
+            MarkName::Dot => Self::Dot,
+        }
+    }
+}
+
+/// Marks along a side from their number.
+fn n_side(text: &str) -> Result<u32, String> {
+    let n_points: u32 =
+        text.trim().parse().map_err(|_| format!("\"{text}\" is no whole number"))?;
+    let n_side = n_points.isqrt();
+    let fits = n_side * n_side == n_points && n_side % 2 == 1 && (3..=N_SIDE_MAX).contains(&n_side);
+    fits.then_some(n_side).ok_or_else(|| {
+        format!("{n_points} is not the square of an odd number from 3 to {N_SIDE_MAX}")
+    })
+}

@@ -1,0 +1,114 @@
+//! Correction files: bit for bit, and no damage goes unnoticed.
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+use expect_test::expect;
+use ftheta_formats::correction_file::{CorrectionFileError, read, write};
+use ftheta_physics::correction::{About, CorrectionPlane, CorrectionTable, Drift};
+use ftheta_physics::grid_map::{GridMap, Interpolation};
+
+fn plane(z_mm: f64, n_nodes: usize, interpolation: Interpolation) -> CorrectionPlane {
+    // Near the identity, with last digits that few decimals would lose.
+    let value = |u: f64, v: f64| Some([u * 1.01 + v * v / 3.0, v * 0.99 - u * u / 7.0 + 1e-17]);
+    let angles = GridMap::tabled(0.21 + 1e-16, interpolation, n_nodes, value).unwrap();
+    CorrectionPlane { z_mm, angles }
+}
+
+fn table(drift: Drift) -> CorrectionTable {
+    let about = About {
+        machine: "my \"head\"\n, µ".into(),
+        optics_id: "0123456789abcdef".into(),
+        model: "physical".into(),
+        n_rounds: 3,
+    };
+    let planes = vec![
+        plane(-1.5, 3, Interpolation::Bilinear),
+        plane(1.0 / 3.0, 5, Interpolation::CatmullRom),
+    ];
+    CorrectionTable::new(about, planes, drift).unwrap()
+}
+
+const DRIFT: Drift = Drift { gain: [1.000_012_3, 0.99999], offset_rad: [1e-5 / 3.0, -0.0] };
+
+#[test]
+fn tables_are_read_as_written_bit_for_bit() {
+    for drift in [Drift::NONE, DRIFT] {
+        let (table, text) = (table(drift), write(&table(drift)));
+        let read = read(text.as_bytes()).unwrap();
+        assert_eq!((&read, write(&read)), (&table, text));
+        let bits = |table: &CorrectionTable| {
+            let values = table.planes().iter().flat_map(|plane| plane.angles.nodes());
+            values.flat_map(|(u, v, [x, y])| [u, v, x, y]).map(f64::to_bits).collect::<Vec<_>>()
+        };
+        assert_eq!(bits(&read), bits(&table));
+    }
+    let head: Vec<String> = write(&table(DRIFT)).lines().take(8).map(String::from).collect();
+    expect![""].assert_eq(&head.join("\n"));
+}
+
+#[test]
+fn every_damage_is_noticed() {
+    let whole = write(&table(DRIFT)).into_bytes();
+    for n_bytes in 0..whole.len() {
+        assert!(read(&whole[..n_bytes]).is_err(), "cut to {n_bytes}");
+        for bit in [0x01, 0x10, 0x80] {
+            let mut flipped = whole.clone();
+            flipped[n_bytes] ^= bit;
+            assert!(read(&flipped).is_err(), "bit {bit} of {n_bytes}");
+        }
+    }
+    let lines: Vec<&str> = str::from_utf8(&whole).unwrap().split_inclusive('\n').collect();
+    for index in 0..lines.len() {
+        let without: String =
+            lines.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, l)| *l).collect();
+        assert!(read(without.as_bytes()).is_err(), "without line {}", index + 1);
+        let twice: String =
+            lines.iter().enumerate().map(|(i, l)| l.repeat(1 + usize::from(i == index))).collect();
+        assert!(read(twice.as_bytes()).is_err(), "line {} twice", index + 1);
+    }
+}
+
+#[test]
+fn the_line_at_fault_is_named() {
+    let whole = write(&table(DRIFT));
+    let error = |from: &str, to: &str| {
+        let changed = whole.replacen(from, to, 1);
+        assert_ne!(changed, whole, "{from}");
+        read(changed.as_bytes()).unwrap_err().to_string()
+    };
+    let found = [
+        error("correction 1", "correction 2"),
+        error("\"0123456789abcdef\"", "0123"),
+        error("rounds 3", "rounds -3"),
+        error("drift gain", "drift gains"),
+        error("offset_rad 3", "offset_rad NaN3"),
+        error("planes 2", "planes 0"),
+        error("planes 2", "planes 99999999999999999999"),
+        error("nodes 3", "nodes 2"),
+        error("nodes 3", "nodes 60000"),
+        error("nodes 3", "nodes 4"),
+        error("bilinear", "nearest"),
+        error("half_width_rad 0.", "half_width_rad -0."),
+        error("sha256 ", "sha256 00"),
+        error("rounds 3", "rounds 4"),
+        read(format!("{whole}more").as_bytes()).unwrap_err().to_string(),
+        read(b"").unwrap_err().to_string(),
+        read(b"ftheta correction 1\n\xff").unwrap_err().to_string(),
+        read(whole.replace('\n', "\r\n").as_bytes()).unwrap_err().to_string(),
+    ];
+    expect![""].assert_eq(&found.join("\n"));
+}
+
+/// A file whose checksum is right and whose table folds over.
+#[test]
+fn tables_that_fold_over_are_refused() {
+    use sha2::{Digest, Sha256};
+    let whole = write(&table(Drift::NONE));
+    let mut lines: Vec<&str> = whole.lines().collect();
+    lines.pop();
+    // Two nodes of the first plane change places.
+    lines.swap(6, 7);
+    let text = lines.join("\n") + "\n";
+    let digest: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+    let error = read(format!("{text}sha256 {digest}\n").as_bytes()).unwrap_err();
+    assert!(matches!(error, CorrectionFileError::Table(_)), "{error}");
+}

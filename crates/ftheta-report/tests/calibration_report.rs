@@ -1,0 +1,96 @@
+//! The page of a calibration: whole, legible, and needing nothing else.
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+use expect_test::expect;
+use ftheta_model::space::FieldPoint;
+use ftheta_model::warning::Warning;
+use ftheta_report::calibration_report::{
+    AxesFound, CalibrationReportInput, ErrorMap, ErrorSummary, ReportParameter, ReportPoint,
+    calibration_report_html,
+};
+
+/// Points of a grid with barrel distortion before and a little after, one of them an outlier.
+fn points(n_side: u32) -> Vec<ReportPoint> {
+    let at = |index: u32| 280.0 * (f64::from(index) / f64::from(n_side - 1) - 0.5);
+    let point = |index: u32| {
+        let (x, y) = (at(index % n_side), at(index / n_side));
+        let outlier = index == n_side + 1;
+        let slip_mm = if outlier { 1.2 } else { 0.0 };
+        let radius = (x * x + y * y) / (140.0 * 140.0);
+        let left_mm = 0.004 * (f64::from(index * 7 % 5) - 2.0);
+        ReportPoint {
+            target_mm: FieldPoint::new(x, y),
+            error_before_mm: [0.012 * x * radius + slip_mm, -0.02 * y * radius],
+            error_after_mm: [left_mm + slip_mm, -0.5 * left_mm],
+            outlier,
+            line: index + 2,
+        }
+    };
+    (0..n_side * n_side).map(point).collect()
+}
+
+fn page(points: &[ReportPoint], errors_um: &[f64]) -> String {
+    let parameter = |name: &str, value, sigma, unit: &str| ReportParameter {
+        name: name.into(),
+        value,
+        sigma,
+        unit: unit.into(),
+    };
+    calibration_report_html(&CalibrationReportInput {
+        machine: "S14-f420",
+        model: "physical",
+        why: "25 points bear the model of the head, and it leaves the least",
+        points,
+        before_um: ErrorSummary { rms: 2642.4, max: 5911.0 },
+        after_um: ErrorSummary { rms: 7.31, max: 16.2 },
+        expected_um: ErrorSummary { rms: 8.2, max: 19.4 },
+        expected_map: ErrorMap { half_width_mm: 140.0, errors_um },
+        axes: AxesFound { swapped: false, x_reversed: false, y_reversed: true },
+        parameters: &[
+            parameter("focal length", 419.2, Some(0.31), "mm"),
+            parameter("gain of x", 1.0031, None, ""),
+        ],
+        advice: &["measure 81 points: 5 µm rms are to be expected".into()],
+        warnings: &[Warning::new("m.csv:8", "does not fit the others <by 1.2 mm>")],
+    })
+}
+
+/// The text between the tags, a line for each run of it.
+fn text(html: &str) -> String {
+    let body = html.split_once("</head>").unwrap().1;
+    let runs = body.split('<').filter_map(|run| Some(run.split_once('>')?.1.trim()));
+    runs.filter(|run| !run.is_empty()).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_page_says_what_was_found() {
+    let html = page(&points(5), &[4.0, 5.0, 6.5, 19.4]);
+    for forbidden in ["<script", "http", "src=", "NaN", "<by"] {
+        assert!(!html.contains(forbidden), "{forbidden}");
+    }
+    // Arrows before and after, two maps with their colours.
+    assert_eq!(html.matches("<svg").count(), 6);
+    assert_eq!(html.matches("<svg").count(), html.matches("</svg>").count());
+    // The outlier is ringed in three pictures.
+    assert_eq!(html.matches("class=ring").count(), 3);
+    let is_axis = |line: &&str| line.chars().all(|c| c.is_ascii_digit() || "\u{2212}.".contains(c));
+    let text = text(&html);
+    let found: Vec<&str> = text.lines().filter(|line| !is_axis(line)).collect();
+    expect![""].assert_eq(&found.join("\n"));
+}
+
+#[test]
+fn pages_of_nothing_of_nonsense_and_of_very_much_are_still_pages() {
+    let html = page(&[], &[]);
+    assert!(html.ends_with("</html>\n") && !html.contains("class=ring"));
+    let mut wrong = points(3);
+    wrong[0].target_mm.x_mm = f64::NAN;
+    wrong[1].error_after_mm = [f64::INFINITY, 0.0];
+    let html = page(&wrong, &[f64::NAN, 1.0, 1.0, 1.0]);
+    assert!(!html.contains("NaN") && !html.contains("inf"));
+    let same = vec![ReportPoint { error_before_mm: [0.0; 2], ..points(3)[0] }; 4];
+    let html = page(&same, &[1.0; 3]);
+    assert!(html.contains("All errors are zero.") && !html.contains("NaN"));
+    let html = page(&points(201), &[5.0; 101 * 101]);
+    assert!(html.len() < 3_000_000, "{} bytes", html.len());
+}
