@@ -1,5 +1,7 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use ftheta_calibrate::error::CalibrateError;
+use ftheta_physics::correction::CorrectionError;
 use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
@@ -117,6 +119,29 @@ pub enum Error {
     /// A pattern cannot be made.
     #[error(transparent)]
     Pattern(#[from] PatternError),
+    /// Measured marks give no calibration.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateError),
+    /// A correction table that this machine cannot use.
+    #[error("{path}: {source}", path = path.display())]
+    Correction {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong.
+        source: CorrectionError,
+    },
+    /// Commands of a controller in a table of points.
+    #[error("{path}: it holds commands of a controller, say how many of its units are a millimetre with --units-per-mm", path = path.display())]
+    Units {
+        /// The table.
+        path: PathBuf,
+    },
+    /// A pattern without anything to be measured.
+    #[error("{path}: no cross, dot or crossing of lines is in it", path = path.display())]
+    NoSights {
+        /// The pattern.
+        path: PathBuf,
+    },
     /// A pattern file is at fault.
     #[error("{path}: {source}", path = path.display())]
     PatternFile {
@@ -216,6 +241,16 @@ impl Error {
             Self::CorrectionFile { path, source } => in_file(path, source.fault()),
             Self::CorFile { path, source } => in_file(path, source.fault()),
             Self::Exchange { path, source } => in_file(path, source.fault()),
+            Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
+            Self::Correction { path, source } => {
+                (path.display().to_string(), source.to_string(), String::new())
+            }
+            Self::Units { path } => {
+                (path.display().to_string(), "no --units-per-mm".into(), "above 0".into())
+            }
+            Self::NoSights { path } => {
+                (path.display().to_string(), "0 places".into(), "at least one".into())
+            }
             Self::Field { path, source } => in_file(path, source.fault()),
             Self::PatternFile { path, source } => in_file(path, source.fault()),
             Self::PlanFile { path, source } => in_file(path, source.fault()),
