@@ -40,14 +40,21 @@ struct Node {
     before: u32,
 }
 
+/// How far the beam goes in a step, mm, and the energy that it leaves, J.
+#[derive(Clone, Copy)]
+struct Step {
+    way_mm: f64,
+    energy_j: f64,
+}
+
 /// The light of a mark, and where along the curve it belongs.
 pub struct Progress {
     /// Cheapest first.
     courses: Vec<Course>,
     next: Vec<Course>,
     nodes: Vec<Node>,
-    /// Energy of every step that is not decided, J.
-    waiting_j: Vec<f64>,
+    /// Steps that are not decided.
+    waiting: Vec<Step>,
     /// Arc position of the last light that is decided, mm.
     decided_mm: f64,
     /// Farther positions do not have the energy of one step between them, mm.
@@ -57,14 +64,15 @@ pub struct Progress {
 impl Progress {
     /// Light that begins at an arc position.
     ///
-    /// * `jump_mm`: between positions that are farther apart no energy is spread, mm
+    /// * `jump_mm`: between positions that are farther apart no energy is spread unless the beam
+    ///   went as far, mm
     pub fn new(at_mm: f64, jump_mm: f64) -> Self {
         let course = Course { at_mm, goes_on_mm: at_mm, cost_mm: 0.0, node: ROOT };
         Self {
             courses: vec![course],
             next: Vec::new(),
             nodes: Vec::new(),
-            waiting_j: Vec::new(),
+            waiting: Vec::new(),
             decided_mm: at_mm,
             jump_mm,
         }
@@ -78,13 +86,14 @@ impl Progress {
         way_mm: f64,
         (energy_j, dose): (f64, &mut LineDose),
     ) {
-        if let ([course], true) = (&mut self.courses[..], self.waiting_j.is_empty()) {
+        let step = Step { way_mm, energy_j };
+        if let ([course], true) = (&mut self.courses[..], self.waiting.is_empty()) {
             let expected_mm = course.goes_on_mm + way_mm;
             if let Some(at_mm) = contour.only(nearest, expected_mm)
                 && (at_mm - expected_mm).abs() <= way_mm + SAME_MM
             {
                 *course = Course { at_mm, goes_on_mm: at_mm, cost_mm: 0.0, ..*course };
-                self.decide(at_mm, energy_j, dose);
+                self.decide(at_mm, step, dose);
                 return;
             }
         }
@@ -113,16 +122,16 @@ impl Progress {
         let most_mm = least_mm + COST_MAX_MM;
         next.truncate(next.partition_point(|course| course.cost_mm <= most_mm));
         self.next = std::mem::replace(&mut self.courses, next);
-        if self.courses.len() == 1 && self.waiting_j.is_empty() {
-            self.decide(self.courses[0].at_mm, energy_j, dose);
+        if self.courses.len() == 1 && self.waiting.is_empty() {
+            self.decide(self.courses[0].at_mm, step, dose);
             return;
         }
-        self.waiting_j.push(energy_j);
+        self.waiting.push(step);
         for course in &mut self.courses {
             self.nodes.push(Node { at_mm: course.at_mm, before: course.node });
             course.node = (self.nodes.len() - 1) as u32;
         }
-        if self.courses.len() == 1 || self.waiting_j.len() >= N_STEPS_MAX {
+        if self.courses.len() == 1 || self.waiting.len() >= N_STEPS_MAX {
             self.settle(dose);
         }
     }
@@ -130,18 +139,17 @@ impl Progress {
     /// Decides for the best way; returns the arc position at which it ends, mm.
     pub fn settle(&mut self, dose: &mut LineDose) -> f64 {
         let mut best = self.courses[0];
-        let mut places_mm = Vec::with_capacity(self.waiting_j.len());
+        let mut places_mm = Vec::with_capacity(self.waiting.len());
         let mut at = best.node;
         while let Some(node) = self.nodes.get(at as usize) {
             places_mm.push(node.at_mm);
             at = node.before;
         }
-        let waiting_j = std::mem::take(&mut self.waiting_j);
-        for (&at_mm, &energy_j) in places_mm.iter().rev().zip(&waiting_j) {
-            self.decide(at_mm, energy_j, dose);
+        let mut waiting = std::mem::take(&mut self.waiting);
+        for (&at_mm, step) in places_mm.iter().rev().zip(waiting.drain(..)) {
+            self.decide(at_mm, step, dose);
         }
-        self.waiting_j = waiting_j;
-        self.waiting_j.clear();
+        self.waiting = waiting;
         self.nodes.clear();
         best.node = ROOT;
         self.courses.clear();
@@ -150,9 +158,10 @@ impl Progress {
     }
 
     /// Gives the energy of a step to the curve, from the last place on.
-    fn decide(&mut self, at_mm: f64, energy_j: f64, dose: &mut LineDose) {
+    fn decide(&mut self, at_mm: f64, step: Step, dose: &mut LineDose) {
+        let Step { way_mm, energy_j } = step;
         let before_mm = std::mem::replace(&mut self.decided_mm, at_mm);
-        if (at_mm - before_mm).abs() <= self.jump_mm {
+        if (at_mm - before_mm).abs() <= self.jump_mm.max(2.0 * way_mm) {
             dose.add(before_mm, at_mm, energy_j);
         } else {
             dose.add(before_mm, before_mm, 0.5 * energy_j);

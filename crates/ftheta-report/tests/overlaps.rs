@@ -129,3 +129,14 @@ fn laps_of_a_circle_are_alike() {
     near(dose.min, 0.5, 0.01);
     near(dose.max, 0.5, 0.01);
 }
+
+/// A step of the beam that is longer than the window still gives its energy to all of its way.
+#[test]
+fn a_fast_beam_has_an_even_dose() {
+    let curve = BezPath::from_svg("M0 0 L20 0").unwrap();
+    let beam = |t: f64| Point::new(20_000.0 * t, 0.0);
+    let found = score(&plan(&[curve]), &trace(&[(0, 1_000_000)], beam));
+    let dose = found.dose_ratio.unwrap();
+    near(dose.min, 0.05, 1e-4);
+    near(dose.max, 0.05, 1e-4);
+}
