@@ -144,7 +144,9 @@ impl Line {
 /// square of its distance, mm².
 #[inline]
 pub fn foot(from: Point, way: Vec2, place: Point) -> (f64, f64) {
-    let share = ((place - from).dot(way) / way.hypot2()).max(0.0).min(1.0);
+    let share = (place - from).dot(way) / way.hypot2();
+    // A segment without a length has its start.
+    let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
     (share, (from + share * way).distance_squared(place))
 }
 

@@ -49,7 +49,7 @@ fn goes_on(before: &Mark, mark: &mut Mark, touch_mm: f64) -> bool {
         return false;
     };
     // A curve that closes itself would close elsewhere.
-    let closes = moved.elements().iter().any(|element| *element == PathEl::ClosePath);
+    let closes = moved.elements().contains(&PathEl::ClosePath);
     let fits = angle(arriving, leaving).abs() <= TURN_MAX_RAD
         && (!closes || start.distance(last.end()) < LENGTH_MIN_MM);
     if fits {

@@ -65,10 +65,7 @@ impl Marking<'_> {
     ) -> Result<Piece<'p>, PlanError> {
         let mut relief = Relief::default();
         loop {
-            let calm;
-            let stretch;
-            let part;
-            (stretch, part, calm) = self.stretch(path, asked, &relief)?;
+            let (stretch, part, calm) = self.stretch(path, asked, &relief)?;
             let tables = self.weave.tables();
             let laid = self.weave.lay(&stretch)?;
             if calm {
@@ -85,8 +82,8 @@ impl Marking<'_> {
         }
     }
 
-    /// The stretch of a path with its speeds, its speed as a part of what was asked for, and whether
-    /// it is so calm that nothing is strained.
+    /// The stretch of a path with its speeds, its speed as a part of what was asked for, and
+    /// whether it is so calm that nothing is strained.
     fn stretch<'p>(
         &self,
         path: Cow<'p, Path>,
