@@ -38,9 +38,9 @@ pub enum Family {
     Scale,
     /// The same, and then the error of nine places, bilinear between them.
     NinePoint,
-    /// Tensor and total degree, whichever predicts left-out marks best.
+    /// Tensor and total degree, whichever cross-validation prefers.
     Polynomial,
-    /// Cubic splines over 4 × 4 zones, smooth at their borders, as stiff as left-out marks ask.
+    /// Cubic splines over 4 × 4 zones, smooth at their borders, as stiff as cross-validation asks.
     Zones,
 }
 
@@ -94,7 +94,7 @@ impl Surface {
         Ok(surface)
     }
 
-    /// Adds the part that predicts left-out marks best; what is left of them then.
+    /// Adds the part that cross-validation prefers; what is left of them then.
     fn add(&mut self, errors: &Errors, candidates: &[(Basis, f64)]) -> Option<[DVector<f64>; 2]> {
         let solved = candidates.iter().filter_map(|&(basis, stiffness)| {
             let axis = |index: usize| -> Option<Solved> {
@@ -102,10 +102,10 @@ impl Surface {
                 solve(&design, &errors.errors[index], basis.penalty(), stiffness)
             };
             let (x, y) = (axis(0)?, axis(1)?);
-            let square = x.left_out.norm_squared() + y.left_out.norm_squared();
+            let sum = x.validation + y.validation;
             // One that cannot spare a mark comes last.
-            let square = if square.is_nan() { f64::INFINITY } else { square };
-            Some((square, basis, [x, y]))
+            let sum = if sum.is_nan() { f64::INFINITY } else { sum };
+            Some((sum, basis, [x, y]))
         });
         let (_, basis, axes) = solved.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let left_out = axes.each_ref().map(|axis| axis.left_out.clone());

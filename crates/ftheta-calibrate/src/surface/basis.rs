@@ -17,6 +17,9 @@ pub enum Basis {
     Hats,
 }
 
+/// How far functions go on beyond the square.
+const BEYOND: f64 = 1.06;
+
 impl Basis {
     /// Number of functions of each coordinate.
     pub fn n_terms(self) -> usize {
@@ -29,12 +32,12 @@ impl Basis {
         }
     }
 
-    /// The functions at a place; beyond the square those of its border, polynomials apart from
-    /// the linear ones too, since they run away there.
+    /// The functions at a place. They go on a little beyond the square, since a target in its corner
+    /// may need commands beyond; farther out they stay as they are there, or they would run away.
     ///
     /// * `index`: 0 for the error of x, 1 for that of y
     pub fn terms(self, [u, v]: [f64; 2], index: usize) -> Vec<f64> {
-        let (cu, cv) = (u.clamp(-1.0, 1.0), v.clamp(-1.0, 1.0));
+        let (cu, cv) = (u.clamp(-BEYOND, BEYOND), v.clamp(-BEYOND, BEYOND));
         match self {
             Self::Pincushion => {
                 let (a, b) = if index == 0 { (u, v) } else { (v, u) };

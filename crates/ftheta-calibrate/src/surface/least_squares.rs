@@ -7,6 +7,9 @@ pub struct Solved {
     pub coefficients: DVector<f64>,
     /// Value less prediction without it; NaN where it alone decides a coefficient.
     pub left_out: DVector<f64>,
+    /// Generalised cross-validation: mean square of what left-out values would be off by, each
+    /// weighing alike. At the border of a grid the plain mean says how a fit extrapolates.
+    pub validation: f64,
 }
 
 /// Singular values below this part of the greatest are left out: they hold rounding alone.
@@ -30,7 +33,10 @@ pub fn solve(
         // An equation that alone decides a coefficient says nothing of itself.
         if taken < 1.0 - 1e-9 { left / (1.0 - taken) } else { f64::NAN }
     });
-    Some(Solved { coefficients, left_out })
+    let n = values.len() as f64;
+    let free = (1.0 - hat.sum() / n).max(0.0);
+    let validation = residual.norm_squared() / n / (free * free);
+    Some(Solved { coefficients, left_out, validation })
 }
 
 fn exact(design: &DMatrix<f64>, values: &DVector<f64>) -> Option<(DVector<f64>, DVector<f64>)> {
