@@ -95,11 +95,13 @@ impl Sheet {
     /// The recipe file that `ftheta mark` finds beside the drawing.
     fn recipe(&self) -> String {
         let pen = self.job.pens.first().cloned().unwrap_or_default();
+        // Tenths of a micrometre are fine enough, and short to read.
+        let spacing_mm = (self.hatch_spacing_mm * 1e4).round() * 1e-4;
         format!(
             "# How the pattern is marked. Dots are filled with lines this far apart.\n\
              [[pen]]\nname = \"pattern\"\ncolor = \"{COLOR}\"\nmark_speed_mm_s = {}\n\
-             power_w = {}\nhatch_spacing_mm = {}\n",
-            pen.mark_speed_mm_s, pen.power_w, self.hatch_spacing_mm
+             power_w = {}\nhatch_spacing_mm = {spacing_mm:.4}\n",
+            pen.mark_speed_mm_s, pen.power_w
         )
     }
 
