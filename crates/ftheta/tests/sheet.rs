@@ -143,7 +143,7 @@ fn files_go_together() {
         color = "#000000"
         mark_speed_mm_s = 1000
         power_w = 10
-        hatch_spacing_mm = 0.055999999999999994
+        hatch_spacing_mm = 0.0560
         target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark
         -140,-140,,,1,A1
         0,-140,,,1,B1
@@ -194,7 +194,7 @@ fn grids_that_do_not_fit_are_refused() {
         marks of 0.2 mm are too small for a spot of 0.08 mm, 0.32 mm is the limit
         8 marks along a side, expected an odd number from 3 to 65
         67 marks along a side, expected an odd number from 3 to 65
-        65 x 65 marks on 100 mm leave room for labels of 0.218 mm, 0.480 mm is the limit
+        65 x 65 marks on 100 mm leave room for labels of 0.223 mm, 0.480 mm is the limit
         a field of 400 mm with marks of 0 mm reaches over 400 mm, the machine's field is 336 mm"#]]
     .assert_eq(&found.join("\n"));
 }
