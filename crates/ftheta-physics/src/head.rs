@@ -9,7 +9,7 @@
 
 mod trace;
 
-pub use trace::Tracer;
+pub use trace::{Tracer, solve};
 
 /// What a head is made of, and every way in which it is off. Lengths mm, angles rad.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,6 +9,7 @@ use ftheta_model::block::{Block, LaserEdge};
 use ftheta_model::plan::{Motion, Planner, SpeedProfile};
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::space::DacCodes;
+use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::plan::Plan;
 use kurbo::{Point, Vec2};
 use track::Track;
@@ -85,6 +86,13 @@ impl<'a> Renderer<'a> {
         }
     }
 
+    /// Corrects all words and voltages by a table, for the head as it really is.
+    #[must_use]
+    pub fn correct_by(mut self, table: &CorrectionTable) -> Self {
+        self.words.correct_by(table.clone());
+        self
+    }
+
     /// Starts before the first sample of another plan for the same machine, and saves making the
     /// table of its optics again.
     pub fn for_plan<'b>(&self, plan: &'b Plan) -> Renderer<'b> {
@@ -111,6 +119,7 @@ impl<'a> Renderer<'a> {
         }
         self.next_index += block.words.len() as u64;
         self.axes.take_volts(&mut block.volts);
+        self.words.correct_volts(&mut block.volts);
         self.push_edges(block);
         !block.words.is_empty()
     }

@@ -2,11 +2,12 @@
 
 use crate::mismatch::Mismatch;
 use ftheta_model::block::VoltageSample;
-use ftheta_model::machine::{Machine, Sensor};
+use ftheta_model::machine::{Axis, Machine, Sensor};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_model::trace::AxisStates;
 use ftheta_physics::axis_loop::AxisLoop;
 use ftheta_physics::galvo::{CURRENT, Galvo, State};
+use ftheta_physics::head::Tracer;
 use ftheta_physics::lossy::LossyAxis;
 use ftheta_physics::map_table::MapTable;
 use ftheta_physics::optics::field_from_angles;
@@ -38,6 +39,8 @@ pub struct Beam {
     angle_row: State,
     speed_row: State,
     table: Option<MapTable>,
+    /// The head as it really is; none is a perfect one.
+    tracer: Option<Tracer>,
     machine: Machine,
     random: Xoshiro256PlusPlus,
     tick_s: f64,
@@ -67,26 +70,39 @@ impl Beam {
                 (step.a.transpose() * row, row.dot(&step.b))
             })
             .collect();
-        // A little further than the limit, where an overshoot may go.
-        let reach_rad = 1.1 * scanner.angle_max_rad;
-        let table = MapTable::new(reach_rad, 0.0, |x, y| {
-            let place = field_from_angles(&machine.optics, MirrorAngles::new(x, y));
-            Some([place.x_mm, place.y_mm])
-        });
-        Ok(Self {
+        let mut beam = Self {
             axes: [axis.clone(), axis],
             substeps,
             lossy: LossyAxis::new(&plant, scanner, tick_s / f64::from(n_substeps)),
             angle_row: row,
             speed_row: plant.mirror_speed_row(),
-            table,
+            table: None,
+            tracer: None,
             machine: machine.clone(),
             random: Xoshiro256PlusPlus::seed_from_u64(seed),
             tick_s,
             n_ticks: 0,
             angles: [0.0; 2],
             voltages: [0.0; 2],
-        })
+        };
+        beam.tabulate();
+        Ok(beam)
+    }
+
+    /// Puts another head behind the motors.
+    pub fn set_head(&mut self, head: Tracer) {
+        self.tracer = Some(head);
+        self.tabulate();
+    }
+
+    /// Makes the table of the optics.
+    fn tabulate(&mut self) {
+        // A little further than the limit, where an overshoot may go.
+        let reach_rad = 1.1 * self.machine.scanner.angle_max_rad;
+        self.table = MapTable::new(reach_rad, 0.0, |x_rad, y_rad| {
+            let place = self.exact_place([x_rad, y_rad]);
+            Some([place.x_mm, place.y_mm])
+        });
     }
 
     /// Number of trace points per tick.
@@ -128,7 +144,20 @@ impl Beam {
         let [x_rad, y_rad] = self.angles;
         match self.table.as_ref().and_then(|table| table.value(x_rad, y_rad)) {
             Some([x_mm, y_mm]) => FieldPoint::new(x_mm, y_mm),
-            None => field_from_angles(&self.machine.optics, MirrorAngles::new(x_rad, y_rad)),
+            None => self.exact_place(self.angles),
+        }
+    }
+
+    fn exact_place(&self, [x_rad, y_rad]: [f64; 2]) -> FieldPoint {
+        match (&self.tracer, self.machine.optics.first_mirror) {
+            (None, _) => {
+                field_from_angles(&self.machine.optics, MirrorAngles::new(x_rad, y_rad))
+            }
+            (Some(head), Axis::X) => head.place(MirrorAngles::new(x_rad, y_rad)),
+            (Some(head), Axis::Y) => {
+                let place = head.place(MirrorAngles::new(y_rad, x_rad));
+                FieldPoint::new(place.y_mm, place.x_mm)
+            }
         }
     }
 

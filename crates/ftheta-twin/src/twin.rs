@@ -9,6 +9,7 @@ use ftheta_model::dose::DoseMap;
 use ftheta_model::machine::Machine;
 use ftheta_model::space::FieldPoint;
 use ftheta_model::trace::{Trace, TracePoint};
+use ftheta_physics::head::{Head, Tracer};
 use ftheta_physics::servo::ServoError;
 use thiserror::Error;
 
@@ -75,6 +76,15 @@ impl Twin {
             period_ns,
             next_index: 0,
         })
+    }
+
+    /// The same machine with a head as it was really built behind its motors.
+    ///
+    /// * `head`: mirror 1 moves its first coordinate, whichever that is on the machine
+    #[must_use]
+    pub fn with_head(mut self, head: &Head) -> Self {
+        self.beam.set_head(Tracer::new(head));
+        self
     }
 
     /// What has happened since the last call. The first point of a stretch is the last one of

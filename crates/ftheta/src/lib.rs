@@ -26,6 +26,7 @@ pub mod tables;
 pub mod verify;
 
 pub use error::{Error, Fault};
+pub use ftheta_calibrate as calibrate;
 pub use ftheta_formats as formats;
 pub use ftheta_model as model;
 pub use ftheta_physics as physics;

@@ -13,6 +13,8 @@ use ftheta_model::recipe::{Pen, Recipe};
 use ftheta_model::toolpath::Toolpath;
 use ftheta_model::trace::{AxisStates, Trace};
 use ftheta_model::warning::{Imported, Warning};
+use ftheta_physics::correction::CorrectionTable;
+use ftheta_physics::head::Head;
 use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::plan::Plan;
 use ftheta_planner::classic::Settings;
@@ -49,6 +51,10 @@ pub struct MarkOptions {
     pub noise_mm: f64,
     /// Seed of all noise.
     pub seed: u64,
+    /// Correction of the head as it really is.
+    pub table: Option<CorrectionTable>,
+    /// The head on the twin; none is a perfect one.
+    pub head: Option<Head>,
 }
 
 /// Part of the voltage that planned jumps keep for feedback, unless told otherwise.
@@ -56,7 +62,7 @@ pub const RESERVE: f64 = 0.12;
 
 impl Default for MarkOptions {
     /// Pens' own speed, the best planner, 12 % reserve, no store, 10 µm, shortest order, no
-    /// clipping, no mismatch, no noise, seed 1.
+    /// clipping, no mismatch, no noise, seed 1, a perfect head without a table.
     fn default() -> Self {
         Self {
             speed_mm_s: None,
@@ -70,6 +76,8 @@ impl Default for MarkOptions {
             mismatch: Mismatch::default(),
             noise_mm: 0.0,
             seed: 1,
+            table: None,
+            head: None,
         }
     }
 }
@@ -319,7 +327,14 @@ pub(crate) fn play_watched(
     };
     let mut twin = twin(&plan.machine, options, &twin_options)?;
     let mut states = Vec::new();
-    let score = score(plan, Renderer::new(plan), &mut twin, &mut |first_index, trace| {
+    if let Some(head) = &options.head {
+        twin = twin.with_head(head);
+    }
+    let mut renderer = Renderer::new(plan);
+    if let Some(table) = &options.table {
+        renderer = renderer.correct_by(table);
+    }
+    let score = score(plan, renderer, &mut twin, &mut |first_index, trace| {
         observer(Stage::Play(first_index as f64 / n_samples as f64));
         watch(&trace);
         states.extend(trace.states);

@@ -1,6 +1,8 @@
 //! Places and angles as output words.
 
+use ftheta_model::block::VoltageSample;
 use ftheta_model::space::{DacCodes, FieldPoint};
+use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::map_table::MapTable;
 use ftheta_physics::optics::angles_from_field;
 use ftheta_physics::plan::Plan;
@@ -15,6 +17,7 @@ pub(super) struct Words<'a> {
     plan: &'a Plan,
     table: Option<MapTable>,
     pub(super) words_per_rad: f64,
+    correction: Option<CorrectionTable>,
 }
 
 impl<'a> Words<'a> {
@@ -24,12 +27,23 @@ impl<'a> Words<'a> {
             let angles = angles_from_field(optics, FieldPoint::new(x, y))?;
             Some([angles.x_rad, angles.y_rad])
         });
-        Self { plan, table, words_per_rad: 1.0 / plan.machine.output.word_step_rad() }
+        let words_per_rad = 1.0 / plan.machine.output.word_step_rad();
+        Self { plan, table, words_per_rad, correction: None }
     }
 
     /// The same for another plan of the same machine.
     pub(super) fn for_plan<'b>(&self, plan: &'b Plan) -> Words<'b> {
-        Words { plan, table: self.table.clone(), words_per_rad: self.words_per_rad }
+        Words {
+            plan,
+            table: self.table.clone(),
+            words_per_rad: self.words_per_rad,
+            correction: self.correction.clone(),
+        }
+    }
+
+    /// Corrects all that is sent from here on.
+    pub(super) fn correct_by(&mut self, table: CorrectionTable) {
+        self.correction = Some(table);
     }
 
     /// The word pair for a place.
@@ -45,12 +59,38 @@ impl<'a> Words<'a> {
         tabled.unwrap_or_else(|| self.exact(place))
     }
 
-    /// The word pair for angles, rad.
+    /// The word pair for angles, rad, as the real head needs them.
     #[inline]
-    pub(super) fn rounded(&self, [x_rad, y_rad]: [f64; 2]) -> DacCodes {
-        DacCodes {
-            x: (x_rad * self.words_per_rad).round_ties_even() as i32,
-            y: (y_rad * self.words_per_rad).round_ties_even() as i32,
+    pub(super) fn rounded(&self, angles_rad: [f64; 2]) -> DacCodes {
+        let round = |rad: f64| (rad * self.words_per_rad).round_ties_even() as i32;
+        let [x, y] = match &self.correction {
+            None => angles_rad.map(round),
+            // A command that leads the mirror may be moved past the last word.
+            Some(table) => {
+                let limit = self.plan.machine.output.word_max();
+                table.angles(angles_rad).map(|rad| round(rad).clamp(-limit, limit))
+            }
+        };
+        DacCodes { x, y }
+    }
+
+    /// Planned states and voltages as the real head needs them: angles by the table, what changes
+    /// them by its slopes.
+    pub(super) fn correct_volts(&self, volts: &mut [[VoltageSample; 2]]) {
+        let Some(table) = &self.correction else {
+            return;
+        };
+        for pair in volts {
+            let [x, y] = *pair;
+            let angles_rad = [x.state[0], y.state[0]];
+            let (corrected, slopes) = (table.angles(angles_rad), table.slopes(angles_rad));
+            for (sample, (angle_rad, by)) in pair.iter_mut().zip(corrected.iter().zip(slopes)) {
+                let blend = |of: &dyn Fn(&VoltageSample) -> f64| by[0] * of(&x) + by[1] * of(&y);
+                sample.next_v = blend(&|sample| sample.next_v);
+                sample.acting_v = blend(&|sample| sample.acting_v);
+                sample.state = std::array::from_fn(|k| blend(&|sample| sample.state[k]));
+                sample.state[0] = *angle_rad;
+            }
         }
     }
 

@@ -1,0 +1,98 @@
+//! What keeps marks from becoming a table.
+
+use thiserror::Error;
+
+/// Why marks give no calibration.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// Too few marks.
+    #[error("{n_marks} marks are too few: {model} needs at least {limit}")]
+    TooFew {
+        /// Marks at hand.
+        n_marks: usize,
+        /// Name of the model.
+        model: &'static str,
+        /// Fewest marks.
+        limit: usize,
+    },
+    /// All on one line.
+    #[error(
+        "the targets lie on a line: they spread {across_mm:.3} mm across it and {along_mm:.1} mm \
+         along it, the limit is a fiftieth"
+    )]
+    Collinear {
+        /// Root mean square across the line, mm.
+        across_mm: f64,
+        /// Root mean square along it, mm.
+        along_mm: f64,
+    },
+    /// Numbers of another unit, most likely.
+    #[error(
+        "the measured field is {ratio:.4} times as large as the targets: {suspicion}; give both in \
+         mm"
+    )]
+    Unit {
+        /// Measured by target.
+        ratio: f64,
+        /// What it looks like.
+        suspicion: &'static str,
+    },
+    /// Measured by target far from one, without a guess why.
+    #[error(
+        "the measured field is {ratio:.3} times as large as the targets, the limit is 0.5 to 2; is \
+         the focal length in the machine file ({focal_mm} mm) right?"
+    )]
+    Size {
+        /// Measured by target.
+        ratio: f64,
+        /// First coefficient of the lens, or working distance, mm.
+        focal_mm: f64,
+    },
+    /// Columns exchanged, most likely.
+    #[error(
+        "the measured places lie on a regular grid ({n_measured} different x for {n_marks} marks) \
+         and the targets do not ({n_targets}): are the columns of targets and measured exchanged?"
+    )]
+    Exchanged {
+        /// Marks.
+        n_marks: usize,
+        /// Different x among the targets.
+        n_targets: usize,
+        /// Different x among the measured.
+        n_measured: usize,
+    },
+    /// The axes cannot be told.
+    #[error(
+        "the measured places do not follow the targets: the best of the eight ways to swap and \
+         mirror the axes leaves {rms_mm:.1} mm, the field is {field_mm:.0} mm wide"
+    )]
+    Unrelated {
+        /// What an affine map leaves, mm rms.
+        rms_mm: f64,
+        /// Width of the targets, mm.
+        field_mm: f64,
+    },
+    /// A fit that cannot be solved.
+    #[error("{model} cannot be fitted to these {n_marks} marks: the equations have no solution")]
+    Singular {
+        /// Name of the model.
+        model: &'static str,
+        /// Marks used.
+        n_marks: usize,
+    },
+    /// The model has no angles for a place of the table.
+    #[error(
+        "the calibrated head reaches no place near x {x_mm:.1} mm, y {y_mm:.1} mm, so no table can \
+         be made; look for wrong rows near it"
+    )]
+    Unreachable {
+        /// The place, mm.
+        x_mm: f64,
+        /// The place, mm.
+        y_mm: f64,
+    },
+    /// The table made is not usable.
+    #[error("{0}")]
+    Table(#[from] ftheta_physics::correction::CorrectionError),
+}

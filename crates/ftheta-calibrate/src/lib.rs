@@ -1,0 +1,14 @@
+//! From measured marks to a model of the head, its expected accuracy, and a correction table.
+//!
+//! [`calibrate::calibrate`] is the entry: marks in, a [`calibrate::Calibration`] out, which says
+//! what it found and makes tables.
+
+mod accuracy;
+pub mod axes;
+pub mod calibrate;
+pub mod error;
+pub mod mark;
+mod physical;
+pub mod sanity;
+mod surface;
+pub mod table;
