@@ -61,9 +61,8 @@ pub fn fit(optics: &Optics, axes: Axes, marks: &[Mark], noise: Noise) -> Option<
         let step = (&posterior.estimate - &estimate).amax();
         estimate.copy_from(&posterior.estimate);
         let still = step < SETTLED;
-        let wrong = (step < 1.0)
-            .then(|| wrong_mark(&equations, &sums, &posterior, &used, noise))
-            .flatten();
+        let wrong =
+            (step < 1.0).then(|| wrong_mark(&equations, &sums, &posterior, &used, noise)).flatten();
         if let Some(mark) = wrong {
             used[mark] = false;
         }
@@ -92,8 +91,12 @@ fn innovation(
     let predicted = &rows * &posterior.estimate;
     let data = equations.data_mm.fixed_rows::<2>(2 * mark);
     let covariance = posterior.covariance(&rows);
-    let covariance =
-        Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 0)], covariance[(1, 1)]);
+    let covariance = Matrix2::new(
+        covariance[(0, 0)],
+        covariance[(0, 1)],
+        covariance[(1, 0)],
+        covariance[(1, 1)],
+    );
     (data - Vector2::new(predicted[0], predicted[1]), covariance)
 }
 
