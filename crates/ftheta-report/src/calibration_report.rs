@@ -69,9 +69,9 @@ pub struct ErrorSummary {
 /// Errors on an even square grid about the field's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorMap<'a> {
-    /// From the centre to the border of the outermost cells, mm.
+    /// From the centre to the outermost places, mm.
     pub half_width_mm: f64,
-    /// Errors in the middle of n × n cells, µm: rows of rising y, in each row x rising.
+    /// Errors at n × n places, n at least 2, µm: rows of rising y, in each row x rising.
     pub errors_um: &'a [f64],
 }
 
@@ -259,7 +259,7 @@ fn parameters(out: &mut String, parameters: &[ReportParameter]) {
 /// A value with as many decimals as its deviation needs for two digits, or else six digits.
 fn value_text(value: f64, sigma: Option<f64>) -> String {
     let known = sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0);
-    let finest = known.map_or_else(|| value.abs().max(1e-9) * 1e-4, |sigma| sigma);
+    let finest = known.unwrap_or_else(|| value.abs().max(1e-9) * 1e-4);
     let n_decimals = (1.0 - finest.log10().floor()).clamp(0.0, 12.0) as usize;
     if value.is_finite() { format!("{value:.n_decimals$}") } else { "–".into() }
 }
