@@ -68,6 +68,18 @@ pub enum Error {
         /// The table.
         path: PathBuf,
     },
+    /// Points that are commands of a controller whose scale is not known.
+    #[error("{path}: holds commands of a controller, their units per mm have to be given", path = path.display())]
+    NeedsScale {
+        /// The file of points.
+        path: PathBuf,
+    },
+    /// A table that a user has filled in and that would be written over.
+    #[error("{path}: has measured places in it; move it away, or choose another name", path = path.display())]
+    Filled {
+        /// The table.
+        path: PathBuf,
+    },
     /// A drawing is at fault.
     #[error("{path}: {source}", path = path.display())]
     Svg {
@@ -208,6 +220,12 @@ impl Error {
             }
             Self::NeedsMachine { path } => {
                 (path.display().to_string(), "no --machine".into(), "a preset or a file".into())
+            }
+            Self::NeedsScale { path } => {
+                (path.display().to_string(), "commands".into(), "units per mm above 0".into())
+            }
+            Self::Filled { path } => {
+                (path.display().to_string(), "measured places".into(), "none, or no file".into())
             }
             Self::Svg { path, source } => in_file(path, source.fault()),
             Self::Toml(error) => error.fault(),

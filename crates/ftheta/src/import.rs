@@ -1,8 +1,10 @@
-//! Reads drawings and recipes from files.
+//! Reads drawings, recipes, patterns and measured points from files.
 
 use crate::Error;
-use ftheta_formats::{recipe, svg};
+use ftheta_formats::{pattern_file, points, recipe, svg};
+use ftheta_model::calibration::MeasuredPoint;
 use ftheta_model::job::Job;
+use ftheta_model::pattern::Pattern;
 use ftheta_model::recipe::Recipe;
 use ftheta_model::warning::Imported;
 use std::fs::File;
@@ -45,6 +47,31 @@ pub fn recipe_for(drawing: &Path, file: Option<&Path>) -> Result<(Recipe, Option
     };
     let recipe = recipe::read(&path.display().to_string(), &text(path)?)?;
     Ok((recipe, Some(path.into())))
+}
+
+/// Reads a pattern file.
+///
+/// # Errors
+/// If the file cannot be read or is at fault.
+pub fn pattern(path: &Path) -> Result<Pattern, Error> {
+    pattern_file::read(&bytes(path)?)
+        .map_err(|source| Error::PatternFile { path: path.into(), source })
+}
+
+/// Reads measured points.
+///
+/// * `units_per_mm`: scale of the controller, for files that hold its commands
+///
+/// # Errors
+/// If the file cannot be read or is at fault, or holds commands and their scale is not given.
+pub fn points(
+    path: &Path,
+    units_per_mm: Option<f64>,
+) -> Result<Imported<Vec<MeasuredPoint>>, Error> {
+    let Imported { value, warnings } = points::read(&path.display().to_string(), &bytes(path)?)?;
+    let value = value.measured(units_per_mm);
+    let value = value.ok_or_else(|| Error::NeedsScale { path: path.into() })?;
+    Ok(Imported { value, warnings })
 }
 
 /// The bytes of a file, up to the limit.
