@@ -123,6 +123,8 @@ pub struct ExpectedMap {
 
 /// Places along a side of the map of expected errors.
 const N_PLACES: usize = 21;
+/// The same for what more marks would bring.
+const N_FORECAST: usize = 9;
 /// From this many marks on the physical model is the default.
 const N_PHYSICAL: usize = 9;
 /// A polynomial has to be this much better at marks left out to be preferred, and needs so many.
@@ -288,6 +290,21 @@ impl Calibration {
     /// The head's mounting errors as one; mirror 1 moves its first coordinate.
     pub fn head(&self) -> Head {
         self.physical.head()
+    }
+
+    /// Errors of the physical model to expect with a grid of more marks over the same square, mm rms.
+    ///
+    /// * `n_side`: marks along each side of the grid
+    pub fn forecast_mm(&self, n_side: usize) -> Option<f64> {
+        self.physical.forecast_mm(&self.grid_commands(n_side)?, &self.grid_commands(N_FORECAST)?)
+    }
+
+    /// Commands of a grid over the square of the targets.
+    fn grid_commands(&self, n_side: usize) -> Option<Vec<MirrorAngles>> {
+        let half_mm = self.expected_map.half_mm;
+        let at = |k: usize| half_mm * (2.0 * k as f64 / (n_side - 1) as f64 - 1.0);
+        let places = (0..n_side * n_side).map(|k| FieldPoint::new(at(k % n_side), at(k / n_side)));
+        places.map(|place| self.command(place, angles_from_field(&self.optics, place)?)).collect()
     }
 
     fn jacobian(&self, command: MirrorAngles) -> Matrix2<f64> {

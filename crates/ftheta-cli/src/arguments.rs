@@ -1,8 +1,10 @@
 //! The command line: one struct per command, help texts with an example each.
 
+pub mod calibrate;
 pub mod field;
 pub mod pattern;
 
+use calibrate::{Calibrate, Twin};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use field::Field;
@@ -41,6 +43,10 @@ pub enum Command {
     Pattern(Pattern),
     /// Map places of the field to mirror angles, and back.
     Field(Field),
+    /// Make a correction table from measured marks.
+    Calibrate(Calibrate),
+    /// Rehearse a calibration on a twin with hidden errors.
+    Twin(Twin),
     /// Write a drawing as plain curves (.svg) or as the polylines that are marked (.csv), or a
     /// correction table as another kind of table.
     Convert(Convert),
@@ -120,6 +126,12 @@ pub struct Mark {
     /// Noise of the twin's position sensors, µm rms in the field.
     #[arg(long, value_name = "S", default_value = "0", value_parser = noise)]
     pub noise_um: f64,
+    /// Correction table of the head, as `ftheta calibrate field` writes it.
+    #[arg(long, value_name = "TABLE")]
+    pub table: Option<PathBuf>,
+    /// Mark on a twin whose head has hidden errors, drawn from this seed.
+    #[arg(long, value_name = "SEED")]
+    pub head: Option<u64>,
     /// Folder for report.html, mark.png and plan.ftheta; out/NAME if not given.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -1,5 +1,6 @@
 //! The commands: each reads its arguments, calls the library, prints.
 
+pub mod calibrate;
 pub mod circle;
 pub mod convert;
 pub mod field;

@@ -22,6 +22,8 @@ fn main() -> ExitCode {
         Command::Jump(jump) => command::jump::run(&jump, json),
         Command::Circle(circle) => command::circle::run(&circle, json),
         Command::Convert(convert) => command::convert::run(&convert, json),
+        Command::Calibrate(calibrate) => command::calibrate::run(&calibrate, json),
+        Command::Twin(twin) => command::calibrate::run_twin(&twin, json),
         Command::Field(field) => command::field::run(&field, json),
         Command::Pattern(pattern) => command::pattern::run(&pattern, json),
         Command::Machine(machine) => command::machine::run(&machine, json),

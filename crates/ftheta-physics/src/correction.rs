@@ -6,7 +6,9 @@
 
 use crate::audit::CORRECTION_RESERVE;
 use crate::grid_map::GridMap;
+use crate::optics::field_from_angles;
 use ftheta_model::machine::{Axis, Lens, Optics, Scanner};
+use ftheta_model::space::MirrorAngles;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use thiserror::Error;
@@ -109,8 +111,8 @@ pub enum CorrectionError {
     /// Needs an angle that the mirrors do not have.
     #[error(
         "at nominal angles ({:.3}°, {:.3}°) the table asks {axis:?} for {:.3}°, the limit is \
-         {:.3}°; if the lens' focal length or polynomial in the machine file is wrong, mend that \
-         first",
+         {:.3}°; if the machine file has a wrong focal length, lens polynomial or too large a \
+         field, mend that first",
         place_rad[0].to_degrees(), place_rad[1].to_degrees(), value_rad.to_degrees(),
         limit_rad.to_degrees()
     )]
@@ -127,8 +129,8 @@ pub enum CorrectionError {
     /// Needs a speed that the mirrors do not have.
     #[error(
         "at nominal angles ({:.3}°, {:.3}°) the table makes {axis:?} {ratio:.4} times as fast as \
-         planned, the limit is {limit:.4}; if the lens' focal length or polynomial in the machine \
-         file is wrong, mend that first",
+         planned, the limit is {limit:.4}; if the machine file has a wrong focal length, lens \
+         polynomial or too large a field, mend that first",
         place_rad[0].to_degrees(), place_rad[1].to_degrees()
     )]
     Speed {
@@ -273,18 +275,26 @@ impl CorrectionTable {
         Err(CorrectionError::Machine { table, table_id, machine: machine.to_owned(), id })
     }
 
-    /// Checks that no plan within its own limits leaves the mirrors' limits through the table.
+    /// Checks that nothing in the field leaves the mirrors' limits through the table. Where the beam
+    /// is dark and beyond the field, words are held at the last one.
     ///
     /// # Errors
-    /// If somewhere an angle or a speed would.
-    pub fn check_limits(&self, scanner: &Scanner) -> Result<(), CorrectionError> {
+    /// If somewhere an angle or a speed would leave its limit.
+    pub fn check_limits(&self, scanner: &Scanner, optics: &Optics) -> Result<(), CorrectionError> {
         let limit_rad = scanner.angle_max_rad;
+        let outside = |[x_rad, y_rad]: [f64; 2]| {
+            let place = field_from_angles(optics, MirrorAngles::new(x_rad, y_rad));
+            place.x_mm.abs().max(place.y_mm.abs()) > 0.5 * optics.field_mm
+        };
         let reach_rad = NOMINAL_SHARE * limit_rad;
         // Four times as fine as the grid: between nodes a cubic may bulge.
         let n_nodes = 4 * self.planes[0].angles.n_nodes();
         let at = |index: usize| reach_rad * (2.0 * index as f64 / (n_nodes - 1) as f64 - 1.0);
         for index in 0..n_nodes * n_nodes {
             let place_rad = [at(index % n_nodes), at(index / n_nodes)];
+            if outside(place_rad) {
+                continue;
+            }
             let (angles, slopes) = (self.angles(place_rad), self.slopes(place_rad));
             for (k, axis) in [Axis::X, Axis::Y].into_iter().enumerate() {
                 let value_rad = angles[k];

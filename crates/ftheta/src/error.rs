@@ -3,6 +3,7 @@
 use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
+use ftheta_calibrate::error::CalibrateError;
 use ftheta_formats::cor_file::CorFileError;
 use ftheta_formats::correction_file::CorrectionFileError;
 use ftheta_formats::motion_law::MotionLawError;
@@ -12,6 +13,7 @@ use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::text_table::error::TableError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
+use ftheta_physics::correction::CorrectionError;
 use ftheta_physics::mechanism::MechanismError;
 use ftheta_physics::servo::ServoError;
 use ftheta_planner::PlanError;
@@ -66,12 +68,6 @@ pub enum Error {
     #[error("{path}: a correction table is for one machine, name it with --machine", path = path.display())]
     NeedsMachine {
         /// The table.
-        path: PathBuf,
-    },
-    /// Points that are commands of a controller whose scale is not known.
-    #[error("{path}: holds commands of a controller, their units per mm have to be given", path = path.display())]
-    NeedsScale {
-        /// The file of points.
         path: PathBuf,
     },
     /// A table that a user has filled in and that would be written over.
@@ -129,6 +125,29 @@ pub enum Error {
     /// A pattern cannot be made.
     #[error(transparent)]
     Pattern(#[from] PatternError),
+    /// Measured marks give no calibration.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateError),
+    /// A correction table that this machine cannot use.
+    #[error("{path}: {source}", path = path.display())]
+    Correction {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong.
+        source: CorrectionError,
+    },
+    /// Commands of a controller in a table of points.
+    #[error("{path}: it holds commands of a controller, say how many of its units are a millimetre with --units-per-mm", path = path.display())]
+    Units {
+        /// The table.
+        path: PathBuf,
+    },
+    /// A pattern without anything to be measured.
+    #[error("{path}: no cross, dot or crossing of lines is in it", path = path.display())]
+    NoSights {
+        /// The pattern.
+        path: PathBuf,
+    },
     /// A pattern file is at fault.
     #[error("{path}: {source}", path = path.display())]
     PatternFile {
@@ -221,9 +240,6 @@ impl Error {
             Self::NeedsMachine { path } => {
                 (path.display().to_string(), "no --machine".into(), "a preset or a file".into())
             }
-            Self::NeedsScale { path } => {
-                (path.display().to_string(), "commands".into(), "units per mm above 0".into())
-            }
             Self::Filled { path } => {
                 (path.display().to_string(), "measured places".into(), "none, or no file".into())
             }
@@ -234,6 +250,16 @@ impl Error {
             Self::CorrectionFile { path, source } => in_file(path, source.fault()),
             Self::CorFile { path, source } => in_file(path, source.fault()),
             Self::Exchange { path, source } => in_file(path, source.fault()),
+            Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
+            Self::Correction { path, source } => {
+                (path.display().to_string(), source.to_string(), String::new())
+            }
+            Self::Units { path } => {
+                (path.display().to_string(), "no --units-per-mm".into(), "above 0".into())
+            }
+            Self::NoSights { path } => {
+                (path.display().to_string(), "0 places".into(), "at least one".into())
+            }
             Self::Field { path, source } => in_file(path, source.fault()),
             Self::PatternFile { path, source } => in_file(path, source.fault()),
             Self::PlanFile { path, source } => in_file(path, source.fault()),

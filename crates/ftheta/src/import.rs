@@ -1,7 +1,7 @@
 //! Reads drawings, recipes, patterns and measured points from files.
 
 use crate::Error;
-use ftheta_formats::{pattern_file, points, recipe, svg};
+use ftheta_formats::{pattern_file, recipe, svg};
 use ftheta_model::calibration::MeasuredPoint;
 use ftheta_model::job::Job;
 use ftheta_model::pattern::Pattern;
@@ -49,31 +49,6 @@ pub fn recipe_for(drawing: &Path, file: Option<&Path>) -> Result<(Recipe, Option
     Ok((recipe, Some(path.into())))
 }
 
-/// Reads a pattern file.
-///
-/// # Errors
-/// If the file cannot be read or is at fault.
-pub fn pattern(path: &Path) -> Result<Pattern, Error> {
-    pattern_file::read(&bytes(path)?)
-        .map_err(|source| Error::PatternFile { path: path.into(), source })
-}
-
-/// Reads measured points.
-///
-/// * `units_per_mm`: scale of the controller, for files that hold its commands
-///
-/// # Errors
-/// If the file cannot be read or is at fault, or holds commands and their scale is not given.
-pub fn points(
-    path: &Path,
-    units_per_mm: Option<f64>,
-) -> Result<Imported<Vec<MeasuredPoint>>, Error> {
-    let Imported { value, warnings } = points::read(&path.display().to_string(), &bytes(path)?)?;
-    let value = value.measured(units_per_mm);
-    let value = value.ok_or_else(|| Error::NeedsScale { path: path.into() })?;
-    Ok(Imported { value, warnings })
-}
-
 /// The bytes of a file, up to the limit.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
     let io = |source| Error::Io { path: path.into(), action: "read", source };
@@ -94,4 +69,29 @@ pub(crate) fn text(path: &Path) -> Result<String, Error> {
         action: "read as UTF-8 text",
         source: std::io::Error::new(std::io::ErrorKind::InvalidData, error.utf8_error()),
     })
+}
+
+/// The measured points of a file, in mm.
+///
+/// * `units_per_mm`: scale of the controller whose commands the file may hold instead of targets
+///
+/// # Errors
+/// If the file is at fault, or holds commands and no scale is given.
+pub fn measured_points(
+    path: &Path,
+    units_per_mm: Option<f64>,
+) -> Result<Imported<Vec<MeasuredPoint>>, Error> {
+    let Imported { value, warnings } =
+        ftheta_formats::points::read(&path.display().to_string(), &bytes(path)?)?;
+    let value = value.measured(units_per_mm).ok_or_else(|| Error::Units { path: path.into() })?;
+    Ok(Imported { value, warnings })
+}
+
+/// The pattern of a file.
+///
+/// # Errors
+/// If the file is at fault.
+pub fn pattern(path: &Path) -> Result<Pattern, Error> {
+    pattern_file::read(&bytes(path)?)
+        .map_err(|source| Error::PatternFile { path: path.into(), source })
 }

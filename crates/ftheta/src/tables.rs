@@ -46,6 +46,18 @@ pub fn read(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
     Ok(table)
 }
 
+/// Reads a correction table of this machine through which marks stay within the mirrors' limits.
+///
+/// # Errors
+/// As [`read`], or if an angle or speed could leave its limit.
+pub fn usable(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
+    let table = read(path, machine)?;
+    table
+        .check_limits(&machine.scanner, &machine.optics)
+        .map_err(|source| Error::Correction { path: path.into(), source })?;
+    Ok(table)
+}
+
 /// Writes a table as our own kind of file, or as another.
 ///
 /// # Errors
@@ -57,7 +69,7 @@ pub fn write(
     version: CorVersion,
 ) -> Result<(), Error> {
     let exchanged = |source| Error::Exchange { path: path.into(), source };
-    let content = match kind(path)? {
+    let content = match TableKind::of(path).unwrap_or(TableKind::Own) {
         TableKind::Own => correction_file::write(table).into_bytes(),
         TableKind::Cor => {
             let cor = exchange::cor(table, machine).map_err(exchanged)?;

@@ -171,13 +171,24 @@ fn files_go_together() {
     std::fs::write(out.with_extension("csv"), &filled).unwrap();
     let error = grid(3, MarkStyle::Dot).write(&out).unwrap_err();
     assert!(error.to_string().contains("grid.csv: has measured places"), "{error}");
-    assert_eq!(ftheta::import::points(&out.with_extension("csv"), None).unwrap().value.len(), 9);
+    assert_eq!(
+        ftheta::import::measured_points(&out.with_extension("csv"), None).unwrap().value.len(),
+        9
+    );
     let made = grid(3, MarkStyle::Dot).pattern;
     assert_eq!(ftheta::import::pattern(&out.with_extension("json")).unwrap(), made);
     let bits = folder.path().join("bits.csv");
     std::fs::write(&bits, "-2000 0 -5 0\n2000 0 5 0\n").unwrap();
-    assert!(ftheta::import::points(&bits, None).unwrap_err().to_string().contains("units per mm"));
-    assert_eq!(ftheta::import::points(&bits, Some(400.0)).unwrap().value[0].target_mm.x_mm, -5.0);
+    assert!(
+        ftheta::import::measured_points(&bits, None)
+            .unwrap_err()
+            .to_string()
+            .contains("--units-per-mm")
+    );
+    assert_eq!(
+        ftheta::import::measured_points(&bits, Some(400.0)).unwrap().value[0].target_mm.x_mm,
+        -5.0
+    );
     assert_eq!((points.len(), points[8].target_mm.x_mm, points[8].line), (9, 140.0, 10));
     assert!(grid(3, MarkStyle::Dot).write(&folder.path().join("grid.txt")).is_err());
 }

@@ -76,6 +76,13 @@ impl Sums {
         sums
     }
 
+    /// The sums with more marks, of which only the equations are known.
+    pub fn with(&self, jacobian: &DMatrix<f64>) -> Self {
+        let mut sums = self.clone();
+        sums.gram.gemm_tr(1.0, jacobian, jacobian, 1.0);
+        sums
+    }
+
     /// The scales with the greatest evidence, among all or at the noise given.
     pub fn best(&self, noise_mm: Option<f64>) -> Option<Posterior> {
         let residuals = RESIDUAL_MM.iter();

@@ -41,6 +41,7 @@ pub struct Physical {
     posterior: Posterior,
     tracer: Tracer,
     estimate: DVector<f64>,
+    sums: Sums,
     /// Which marks were used.
     pub used: Vec<bool>,
     /// Of every mark, used or not: measured less predicted without it, mm, in measured coordinates.
@@ -66,15 +67,15 @@ pub fn fit(optics: &Optics, axes: Axes, marks: &[Mark], noise: Noise) -> Option<
         if let Some(mark) = wrong {
             used[mark] = false;
         }
-        settled = Some((posterior, equations));
+        settled = Some((posterior, equations, sums));
         if still && wrong.is_none() {
             break;
         }
     }
-    let (posterior, equations) = settled?;
+    let (posterior, equations, sums) = settled?;
     let left_out_mm = left_out(&equations, &posterior, &used, &model.axes);
     let tracer = Tracer::new(&model.parameters.head(head_values(&model, &estimate)));
-    Some(Physical { model, posterior, tracer, estimate, used, left_out_mm })
+    Some(Physical { model, posterior, tracer, estimate, sums, used, left_out_mm })
 }
 
 fn head_values<'a>(model: &Model, estimate: &'a DVector<f64>) -> &'a [f64] {
@@ -169,11 +170,6 @@ impl Physical {
         self.posterior.scales.noise_mm
     }
 
-    /// Size of the residual, mm.
-    pub fn residual_mm(&self) -> f64 {
-        self.posterior.scales.residual_mm
-    }
-
     /// The head without the residual; mirror 1 moves its first coordinate.
     pub fn head(&self) -> Head {
         self.model.parameters.head(head_values(&self.model, &self.estimate))
@@ -190,6 +186,20 @@ impl Physical {
             prior: parameter.sigma,
         })
         .collect()
+    }
+
+    /// Errors to expect at `places` with `more` marks measured as well, mm rms.
+    pub fn forecast_mm(&self, more: &[MirrorAngles], places: &[MirrorAngles]) -> Option<f64> {
+        let turned = |all: &[MirrorAngles]| -> Vec<_> {
+            all.iter().map(|&c| self.model.axes.commands(c)).collect()
+        };
+        let marks = self.model.jacobian(&turned(more), &self.estimate);
+        let posterior = self.sums.with(&marks).at(self.posterior.scales)?;
+        let jacobian = self.model.jacobian(&turned(places), &self.estimate);
+        let square: f64 = (0..places.len())
+            .map(|k| posterior.covariance(&jacobian.rows(2 * k, 2).into_owned()).trace())
+            .sum();
+        Some((square / places.len() as f64).sqrt())
     }
 
     /// Errors that are left at commands: standard deviation of the distance at each, and the mean of

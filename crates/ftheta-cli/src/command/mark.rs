@@ -13,7 +13,8 @@ use ftheta::output::Output;
 use ftheta::physics::audit::Limits;
 use ftheta::planner::optimal::Corner;
 use ftheta::results::{self, About, delay_rows};
-use ftheta::{Error, import, machines};
+use ftheta::twin::hidden_head::hidden_head;
+use ftheta::{Error, import, machines, tables};
 use std::path::PathBuf;
 
 /// Plans, plays, reports.
@@ -43,6 +44,8 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
         mismatch: arguments.mismatch,
         noise_mm: arguments.noise_um * 1e-3,
         seed: arguments.seed,
+        table: arguments.table.as_deref().map(|path| tables::usable(path, &machine)).transpose()?,
+        head: arguments.head.map(|seed| hidden_head(&machine.optics, seed)),
     };
     let marked = mark(&drawing.value, &machine, &recipe, &options, &mut |stage| {
         progress.observe(stage);

@@ -79,7 +79,7 @@ impl Sheet {
         convert::check_svg(out)?;
         let table = out.with_extension("csv");
         // An hour's work with a ruler must not be lost to a command that is run again.
-        if table.is_file() && import::points(&table, None).is_ok() {
+        if table.is_file() && import::measured_points(&table, None).is_ok() {
             return Err(Error::Filled { path: table });
         }
         let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
