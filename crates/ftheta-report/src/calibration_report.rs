@@ -69,9 +69,9 @@ pub struct ErrorSummary {
 /// Errors on an even square grid about the field's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorMap<'a> {
-    /// From the centre to the outermost places, mm.
+    /// From the centre to the border of the outermost cells, mm.
     pub half_width_mm: f64,
-    /// Errors at n × n places, n at least 2, µm: rows of rising y, in each row x rising.
+    /// Errors in the middle of n × n cells, µm: rows of rising y, in each row x rising.
     pub errors_um: &'a [f64],
 }
 

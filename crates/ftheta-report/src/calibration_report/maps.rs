@@ -71,22 +71,21 @@ fn residuals(points: &[&ReportPoint], top_um: f64) -> String {
     frame.finish()
 }
 
-/// The map as squares around its places; `None` if it is not one.
+/// The map in squares; `None` if it is not one.
 fn expected(map: &ErrorMap<'_>, top_um: f64) -> Option<String> {
     let n_side = map.errors_um.len().isqrt();
     let half_mm = map.half_width_mm;
-    let is_square = n_side > 1 && n_side * n_side == map.errors_um.len();
+    let is_square = n_side > 0 && n_side * n_side == map.errors_um.len();
     if !is_square || !half_mm.is_finite() || half_mm <= 0.0 {
         return None;
     }
-    let cell_mm = 2.0 * half_mm / (n_side - 1) as f64;
-    let reach_mm = half_mm + 0.5 * cell_mm;
-    let mut frame = FieldFrame::new(Rect::new(-reach_mm, -reach_mm, reach_mm, reach_mm));
+    let cell_mm = 2.0 * half_mm / n_side as f64;
+    let mut frame = FieldFrame::new(Rect::new(-half_mm, -half_mm, half_mm, half_mm));
     let side_px = cell_mm * frame.px_per_mm;
     let mut classes = vec![String::new(); ERROR_COLORS.len()];
     for (index, &error_um) in map.errors_um.iter().enumerate() {
         let (row, column) = ((index / n_side) as f64, (index % n_side) as f64);
-        let corner = Point::new(cell_mm * column - reach_mm, cell_mm * (row + 1.0) - reach_mm);
+        let corner = Point::new(cell_mm * column - half_mm, cell_mm * (row + 1.0) - half_mm);
         let (x, y) = frame.place(corner);
         // What is not a number is as bad as it gets.
         let error_um = if error_um.is_finite() { error_um } else { f64::INFINITY };
