@@ -37,7 +37,8 @@ pub enum Command {
     Verify(Verify),
     /// Show how fast a machine can jump, and how near each law comes to that on the twin.
     Jump(Jump),
-    /// Mark one uniform turn of a circle or ellipse on the twin, and measure how true it is.
+    /// Mark one uniform turn of a circle or ellipse, or a spiral, on the twin, and measure how true
+    /// it is.
     Circle(Circle),
     /// Write a pattern to judge a head by, and show on the twin what comes of it.
     Pattern(Pattern),
@@ -276,9 +277,10 @@ pub struct Mechanism {
 #[command(after_help = "\
 Examples:
   ftheta circle --radius-mm 0.5 --speed 2000 --machine S10-f160
-  ftheta circle --radius-mm 2 --ellipse 2 --speed 3000 --out ellipse")]
+  ftheta circle --radius-mm 2 --ellipse 2 --speed 3000 --out ellipse
+  ftheta circle --radius-mm 0.5 --turns 20 --pitch-mm 0.05 --speed 2000")]
 pub struct Circle {
-    /// Radius, mm; of an ellipse the one along x.
+    /// Radius, mm; of an ellipse the one along x, of a spiral the one at its start.
     #[arg(long, value_name = "R", value_parser = positive)]
     pub radius_mm: f64,
     /// Speed of the beam, mm/s.
@@ -290,6 +292,14 @@ pub struct Circle {
     /// Radius along x over radius along y, 0.05 to 20.
     #[arg(long, value_name = "RATIO", default_value = "1", value_parser = ratio)]
     pub ellipse: f64,
+    /// Turns of an Archimedean spiral, whole or not.
+    #[arg(long, value_name = "N", value_parser = positive, requires = "pitch_mm",
+          conflicts_with = "ellipse")]
+    pub turns: Option<f64>,
+    /// By how much the spiral's radius grows every turn, mm; below 0 it falls.
+    #[arg(long, value_name = "P", requires = "turns", value_parser = number,
+          allow_hyphen_values = true)]
+    pub pitch_mm: Option<f64>,
     /// Its centre, mm.
     #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = pair)]
     pub centre_mm: [f64; 2],

@@ -375,6 +375,10 @@ fn a_circle_is_true_and_uniform() {
     }
     let (code, verified) = bench.json(&["verify", "round/plan.ftheta"]);
     assert_eq!(code, 0, "{verified}");
+    let spiral = ["circle", "--radius-mm=0.5", "--turns=3", "--pitch-mm=-0.1", "--speed=2000"];
+    let (code, value) = bench.json(&spiral);
+    assert_eq!(code, 0, "{value}");
+    assert!(value["radius_error_um"]["max"].as_f64().unwrap() <= 0.5, "{value}");
     let fault = bench.fault(&["circle", "--radius-mm", "0.5", "--speed", "50000"]);
     assert!(fault["where"].as_str().unwrap().starts_with("circle"), "{fault}");
 }

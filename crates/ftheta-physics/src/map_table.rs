@@ -66,8 +66,10 @@ impl MapTable {
             (u + self.half_width) * self.cells_per_unit,
             (v + self.half_width) * self.cells_per_unit,
         );
-        // Both are positive here, so truncation is the floor.
-        let (column, row) = (s as usize, t as usize);
+        // Both are positive here, so truncation is the floor; just inside the table's end the sum
+        // may round up to it.
+        let last = self.n_cells - 1;
+        let (column, row) = ((s as usize).min(last), (t as usize).min(last));
         let (su, sv) = (hermite(s - column as f64), hermite(t - row as f64));
         let corner = row * (self.n_cells + 1) + column;
         let [a, b, c, d] =

@@ -188,6 +188,19 @@ fn forward_table_is_within_twenty_nanometres() {
     }
 }
 
+/// Just inside its end a table has a value, though the cell's number rounds up there.
+#[test]
+fn a_table_reaches_its_end() {
+    for half_width in [0.24, 60.0, 60.5, 168.0] {
+        let table = MapTable::new(half_width, 0.0, |u, v| Some([u, v])).unwrap();
+        let inside = f64::from_bits(f64::to_bits(half_width) - 1);
+        for (u, v) in [(inside, inside), (inside, -inside), (-inside, inside), (0.1, inside)] {
+            let [at_u, at_v] = table.value(u, v).unwrap();
+            assert!((at_u - u).abs().max((at_v - v).abs()) < 1e-12 * half_width, "{half_width}");
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn round_trip(x_rad in -0.2..0.2_f64, y_rad in -0.2..0.2_f64) {

@@ -1,4 +1,4 @@
-//! Uniform circles and ellipses, exact through optics and motor.
+//! Uniform circles, ellipses and spirals, exact through optics and motor.
 //!
 //! The mirrors' angles on a closed path are periodic, so they are sums of harmonics. A motor is
 //! linear: each harmonic of the angle is one of the voltage, divided by the motor's response at the
@@ -6,6 +6,7 @@
 //! turn, and a run-out leads back to rest (`design/control.md` E).
 
 mod harmonics;
+mod spiral;
 
 use crate::PlanError;
 use crate::jump::{AxisOptions, CurrentBound, JumpError, Model, Passage, fewest_ticks_of_passages};
@@ -17,6 +18,7 @@ use ftheta_physics::galvo::State;
 use ftheta_physics::optics::scale_mm_per_rad;
 use harmonics::{Harmonics, States};
 use kurbo::{Point, Vec2};
+pub use spiral::{Spiral, spiral};
 
 /// Ticks at rest in the centre after everything.
 const N_TICKS_LAST: u32 = 2;

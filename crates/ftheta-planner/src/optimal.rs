@@ -7,8 +7,11 @@
 mod fly_by;
 mod glide;
 mod heat;
+mod join;
 mod marking;
 mod path;
+mod pieces;
+mod relief;
 mod smoothing;
 mod speed;
 mod turn;
@@ -29,6 +32,7 @@ use ftheta_physics::optics::angles_from_field;
 use ftheta_physics::servo::Gains;
 use glide::Glide;
 use heat::Heat;
+use join::joined;
 use kurbo::Point;
 use marking::Marking;
 use smoothing::Smoothing;
@@ -187,12 +191,13 @@ impl<'a> OptimalPlanner<'a> {
             return;
         }
         let n_threads = thread::available_parallelism().map_or(1, NonZero::get);
-        let n_marks = toolpath.marks.len();
+        let marks = joined(toolpath.marks.iter().cloned(), self.options.tolerance_mm);
+        let n_marks = marks.len();
         let n_each = n_marks.div_ceil(n_threads).max(1);
         thread::scope(|scope| {
             for first in (0..n_marks).step_by(n_each) {
                 // With the mark before, for the way from it to the first.
-                let marks = &toolpath.marks[first.saturating_sub(1)..n_marks.min(first + n_each)];
+                let marks = &marks[first.saturating_sub(1)..n_marks.min(first + n_each)];
                 let (starts, ends) = (first == 0, first + n_each >= n_marks);
                 scope.spawn(move || {
                     let mut marking = self.marking(toolpath.pens.clone(), marks.len());
@@ -214,6 +219,7 @@ impl<'a> OptimalPlanner<'a> {
             return Err(PlanError::Empty);
         }
         pens.iter().try_for_each(|pen| check_pen(pen, self.machine, f64::INFINITY))?;
+        let marks = joined(marks, self.options.tolerance_mm);
         let mut marking = self.marking(pens, marks.len());
         marking.all(marks, [true; 2])?;
         marking.weave.rest_in_centre(lead_out_ticks(self.machine, self.lag_s));

@@ -1,6 +1,7 @@
-//! Scoring 5 million points (10 s of beam): wavy curves, and hatch lines.
+//! Scoring 5 million points (10 s of beam): wavy curves, hatch lines, and laps of one circle.
 
 use divan::Bencher;
+use divan::counter::ItemsCount;
 #[path = "../tests/machine/mod.rs"]
 mod machine;
 
@@ -101,4 +102,17 @@ fn hatch_5_million_points(bencher: Bencher<'_, '_>) {
     let lines: Vec<BezPath> = (0..100).map(|i| line(f64::from(i) * 0.05)).collect();
     let (plan, trace) = scene(&lines);
     bencher.bench(|| score(&plan, &trace));
+}
+
+/// As long for each point as other curves, however many laps there are.
+#[divan::bench(args = [60, 600], sample_count = 1)]
+fn laps_of_a_circle(bencher: Bencher<'_, '_>, n_laps: usize) {
+    let lap = "a0.3 0.3 0 0 1 -0.6 0 a0.3 0.3 0 0 1 0.6 0 ";
+    let curve = BezPath::from_svg(&format!("M10 10 {}", lap.repeat(n_laps)));
+    let (mut plan, mut trace) = scene(&[curve.unwrap_or_default()]);
+    plan.marks.truncate(1);
+    trace.light.truncate(1);
+    let n_points = (trace.light[0].off_ns / STEP_NS) as usize;
+    trace.points.truncate(n_points + 1);
+    bencher.counter(ItemsCount::new(n_points)).bench(|| score(&plan, &trace));
 }

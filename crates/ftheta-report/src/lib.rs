@@ -21,6 +21,8 @@ mod lettering;
 mod light_view;
 mod line_dose;
 mod plot;
+mod progress;
+mod segment_tree;
 mod tally;
 mod text;
 mod track;

@@ -15,7 +15,8 @@ use std::collections::VecDeque;
 /// exact; percentiles of errors are within 0.5 %, those of
 /// the dose within 0.05 %. Curves are followed within 0.02 µm and sampled every 1 µm (marks longer
 /// than 4 m coarser). The dose of a beam 10 µm beside a bend of 2 mm radius is within 0.3 %.
-/// While the beam is within 4 µm of its curve, nearest points are searched within 0.75 mm of arc.
+/// Nearest points are those of the whole curve. Light that is as near to several passages, within
+/// 0.05 µm, belongs to the one that it came to by jumping and turning back least.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
     /// Distance of the lit beam to its own mark's curve, over time.

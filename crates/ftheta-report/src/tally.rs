@@ -106,8 +106,9 @@ impl Tally {
     pub fn take(&mut self, track: &mut MarkTrack, beam: Point, step: Step) {
         let energy_j = step.power_w * step.duration_s;
         let way_mm = track.beam.distance(beam);
-        let a_mm = track.advance(beam, energy_j).distance_mm;
-        let b_mm = track.foot.distance_mm;
+        let a_mm = track.distance_mm();
+        track.advance(beam, energy_j);
+        let b_mm = track.distance_mm();
         let (a_um, b_um) = (1e3 * a_mm, 1e3 * b_mm);
         self.contour_um.see(a_um.max(b_um));
         self.contour_um.add(0.5 * (a_um + b_um), step.duration_s);
@@ -128,15 +129,15 @@ impl Tally {
     /// Closes a mark.
     pub fn end_mark(&mut self, mut track: MarkTrack) {
         self.map.end_mark();
-        for end_mm in [track.before_start_mm, track.past_end_mm()] {
+        for end_mm in [track.before_start_mm, track.end()] {
             self.end_um.add(1e3 * end_mm.abs(), 1.0);
         }
         // Both ends are sampled, so each stands for half a step: weights follow arc length.
         let distances_mm = track.coverage_mm();
         let last = distances_mm.len() - 1;
-        for (index, distance_mm) in distances_mm.into_iter().enumerate() {
+        for (index, (n_passages, distance_mm)) in distances_mm.into_iter().enumerate() {
             let weight = if index == 0 || index == last { 0.5 } else { 1.0 };
-            self.coverage_um.add(1e3 * distance_mm, weight);
+            self.coverage_um.add(1e3 * distance_mm, weight * n_passages as f64);
         }
         for line_j_mm in track.dose.windows_j_mm() {
             let ratio = line_j_mm / track.asked_j_mm;

@@ -1,8 +1,9 @@
 //! One mark while its light is on: nearest points, energy along the curve, the beam's path.
 
-use crate::contour::{Contour, Foot};
+use crate::contour::{Contour, Foot, Nearest};
 use crate::coverage::BeamPath;
 use crate::line_dose::LineDose;
+use crate::progress::Progress;
 use ftheta_model::plan::{PlanDraft, PlannedMark};
 use kurbo::Point;
 
@@ -27,8 +28,10 @@ pub struct MarkTrack {
     pub before_start_mm: f64,
     /// Where the beam is.
     pub beam: Point,
-    /// The curve's point nearest to it.
-    pub foot: Foot,
+    /// What of the curve is nearest to it.
+    nearest: Nearest,
+    /// Where along the curve its light belongs.
+    progress: Progress,
     /// Greatest distance so far, mm, and where the beam was.
     pub worst: (f64, Point),
 }
@@ -43,47 +46,59 @@ impl MarkTrack {
         let pitch_mm = laser.pulse_khz.map_or(0.0, |pulse_khz| speed_mm_s / (1e3 * pulse_khz));
         let window_mm = laser.spot_diameter_mm.max(2.0 * pitch_mm);
         let step_mm = STEP_MM.max(contour.length_mm() / N_SAMPLES_MAX);
-        let start = contour.samples(0.0, 1).next();
-        let off_mm = start.map_or(0.0, |(_, start)| start.distance(beam));
-        let foot = contour.nearest_to_start(beam, off_mm);
+        let foot = contour.nearest_to_start(beam, contour.start().distance(beam));
+        let mut nearest = Nearest::default();
+        contour.find_nearest(beam, &mut nearest);
+        let mut dose = LineDose::new(&contour, window_mm, step_mm);
+        // What lies closer than the window is averaged anyway.
+        let mut progress = Progress::new(foot.at_mm, window_mm);
+        progress.advance(&contour, (beam, &nearest), 0.0, (0.0, &mut dose));
         let mut path = BeamPath::default();
         path.add(beam, 0.0);
         Self {
             mark_index,
             before_start_mm: contour.before_start_mm(beam, foot),
-            dose: LineDose::new(&contour, window_mm, step_mm),
+            dose,
             asked_j_mm: pen.map_or(0.0, |pen| pen.power_w) / speed_mm_s,
             path,
             step_mm,
             contour,
             beam,
-            foot,
-            worst: (foot.distance_mm, beam),
+            worst: (nearest.distance_mm, beam),
+            nearest,
+            progress,
         }
     }
 
-    /// Moves the beam to `beam` while `energy_j` is emitted; returns the nearest point before.
-    pub fn advance(&mut self, beam: Point, energy_j: f64) -> Foot {
-        let before = self.foot;
-        let ahead_mm = self.beam.distance(beam);
-        self.foot = self.contour.nearest(beam, before, ahead_mm);
+    /// Distance of the beam from the curve, mm.
+    pub fn distance_mm(&self) -> f64 {
+        self.nearest.distance_mm
+    }
+
+    /// Moves the beam to `beam` while `energy_j` is emitted.
+    pub fn advance(&mut self, beam: Point, energy_j: f64) {
+        let way_mm = self.beam.distance(beam);
+        self.contour.find_nearest(beam, &mut self.nearest);
+        let light = (energy_j, &mut self.dose);
+        self.progress.advance(&self.contour, (beam, &self.nearest), way_mm, light);
         self.beam = beam;
-        self.dose.add(before.at_mm, self.foot.at_mm, energy_j);
         self.path.add(beam, 0.5 * self.step_mm);
-        if self.foot.distance_mm > self.worst.0 {
-            self.worst = (self.foot.distance_mm, beam);
+        if self.distance_mm() > self.worst.0 {
+            self.worst = (self.distance_mm(), beam);
         }
-        before
     }
 
-    /// How far the light went past the curve's end, mm.
-    pub fn past_end_mm(&self) -> f64 {
-        let foot = self.contour.nearest_to_end(self.beam, self.foot);
+    /// Ends the light; returns how far it went past the curve's end, mm.
+    pub fn end(&mut self) -> f64 {
+        let at_mm = self.progress.settle(&mut self.dose);
+        let foot = Foot { at_mm, distance_mm: self.distance_mm() };
+        let foot = self.contour.nearest_to_end(self.beam, foot);
         self.contour.past_end_mm(self.beam, foot)
     }
 
-    /// Distances in mm of the curve's points from the lit beam.
-    pub fn coverage_mm(&mut self) -> Vec<f64> {
+    /// Distances in mm of the curve's points from the lit beam, each with the number of times that
+    /// the curve passes the point.
+    pub fn coverage_mm(&mut self) -> Vec<(usize, f64)> {
         // The thinned path must still reach to where the light went off.
         self.path.add(self.beam, 1e-9);
         let n = (self.contour.length_mm() / self.step_mm).ceil() as usize + 1;

@@ -22,6 +22,8 @@ pub struct About<'a> {
     pub job_name: &'a str,
     /// How it was marked.
     pub options: &'a MarkOptions,
+    /// Whether it may have corners.
+    pub has_corners: bool,
     /// Size of the page, mm.
     pub page_mm: [f64; 2],
     /// What the job was compared with.
@@ -73,7 +75,7 @@ fn report(marked: &Marked, about: &About<'_>, plate_png: &[u8]) -> String {
             jump_s: times.jump_s - times.delay_s,
             delay_s: times.delay_s,
         },
-        settings: &settings_rows(marked, about.options),
+        settings: &settings_rows(marked, about),
         against: &against,
         warnings: about.warnings,
         plate_png,
@@ -90,7 +92,7 @@ fn rivals(against: &Against) -> Vec<Rival<'_>> {
     rivals.collect()
 }
 
-fn settings_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)> {
+fn settings_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
     let machine = &marked.plan.machine;
     let laser = &machine.laser;
     let mut rows = vec![
@@ -107,13 +109,14 @@ fn settings_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)
     let rows = rows.into_iter().map(|(key, value)| (key.to_owned(), value));
     let planned = match marked.plan.planner {
         Planner::Classic => delay_rows(&marked.settings),
-        Planner::Optimal => planned_rows(marked, options),
+        Planner::Optimal => planned_rows(marked, about),
     };
     rows.chain(planned.into_iter().filter(|(_, value)| value != NONE)).collect()
 }
 
 /// What planned motion was planned with, and what it promises.
-fn planned_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)> {
+fn planned_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
+    let options = about.options;
     let machine = &marked.plan.machine;
     let known = is_servo_known(machine);
     let (f1, kt) = (machine.scanner.f1_uncertainty, machine.scanner.kt_uncertainty);
@@ -133,7 +136,7 @@ fn planned_rows(marked: &Marked, options: &MarkOptions) -> Vec<(String, String)>
     };
     let reserve = format!("{} %", options.reserve * 100.0);
     vec![
-        ("Corners".into(), options.corner.name().into()),
+        ("Corners".into(), if about.has_corners { options.corner.name() } else { NONE }.into()),
         ("Drive".into(), sent.into()),
         ("Transitions".into(), transitions),
         ("Voltage reserve".into(), if known { reserve } else { NONE.into() }),

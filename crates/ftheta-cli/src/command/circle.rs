@@ -1,11 +1,11 @@
-//! `ftheta circle`: one uniform turn, exact through optics and servo.
+//! `ftheta circle`: one uniform turn or a spiral, exact through optics and servo.
 
 use super::mark::print_limits;
 use crate::arguments::Circle;
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::say;
-use ftheta::circle::{Circled, Ellipse, circle};
+use ftheta::circle::{Circled, Ellipse, Round, Spiral, circle};
 use ftheta::mark::MarkOptions;
 use ftheta::model::recipe::Pen;
 use ftheta::output::Output;
@@ -19,7 +19,16 @@ pub fn run(arguments: &Circle, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(&arguments.machine)?;
     let radius_mm = arguments.radius_mm;
     let radii_mm = [radius_mm, radius_mm / arguments.ellipse];
-    let ellipse = Ellipse::new(arguments.centre_mm, radii_mm, arguments.speed);
+    let round = match (arguments.turns, arguments.pitch_mm) {
+        (Some(turns), Some(pitch_mm)) => Round::Spiral(Spiral {
+            centre: <(f64, f64)>::from(arguments.centre_mm).into(),
+            radius_mm,
+            pitch_mm,
+            turns,
+            speed_mm_s: arguments.speed,
+        }),
+        _ => Round::Ellipse(Ellipse::new(arguments.centre_mm, radii_mm, arguments.speed)),
+    };
     let options = MarkOptions {
         reserve: arguments.reserve,
         tolerance_mm: arguments.tolerance_um * 1e-3,
@@ -28,13 +37,20 @@ pub fn run(arguments: &Circle, as_json: bool) -> Result<(), Error> {
     };
     let mut output = arguments.out.as_deref().map(Output::new).transpose()?;
     let observer = &mut |stage| progress.observe(stage);
-    let circled = circle(&machine, &ellipse, Pen::default(), &options, observer)?;
+    let circled = circle(&machine, &round, Pen::default(), &options, observer)?;
     let mut files = Vec::new();
     if let Some(output) = &mut output {
-        let side_mm = 2.2 * radius_mm;
+        let (side_mm, job_name) = match round {
+            Round::Ellipse(_) => (2.2 * radius_mm, "circle"),
+            Round::Spiral(spiral) => {
+                let last_mm = radius_mm + spiral.pitch_mm * spiral.turns;
+                (2.2 * radius_mm.max(last_mm), "spiral")
+            }
+        };
         let about = About {
-            job_name: "circle",
+            job_name,
             options: &options,
+            has_corners: false,
             page_mm: [side_mm; 2],
             warnings: &[],
             against: None,

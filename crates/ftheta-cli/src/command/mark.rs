@@ -61,6 +61,7 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let about = About {
         job_name: &title(arguments),
         options: &options,
+        has_corners: true,
         page_mm: drawing.value.page_mm,
         against: against.as_ref(),
         warnings: &warnings,

@@ -184,18 +184,6 @@ impl Atlas {
         self
     }
 
-    /// Makes a level cover so many ticks.
-    ///
-    /// # Errors
-    /// As [`Self::extend`].
-    pub fn extend_ticks(&mut self, level: usize, n_ticks: usize) -> Result<(), JumpError> {
-        let short = |built: &Level| built.steps_rad.len() <= n_ticks;
-        if level > 0 {
-            self.extend_while(0, short)?;
-        }
-        self.extend_while(level, short)
-    }
-
     fn extend_while(
         &mut self,
         level: usize,

@@ -19,6 +19,10 @@ const LONGER: [f64; 10] = [1.0, 1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.6, 5.0, 8.0];
 const N_TICKS_MIN: usize = 6;
 /// Most ticks of a transition.
 const N_TICKS_MAX: usize = 4000;
+/// Part of the greatest torque with which mirrors are stopped at leisure, and how long it takes to
+/// come, ticks.
+const STOP_SHARE: f64 = 0.2;
+const STOP_TICKS: f64 = 40.0;
 /// Part of what the fans leave of the voltage that corrections may use.
 const CORRECTION_SHARE: f64 = 0.5;
 
@@ -38,6 +42,9 @@ pub(super) struct FlyBy<'a> {
     gains: Gains,
     voltage_max_v: f64,
     current_max_a: f64,
+    /// Angular acceleration with which mirrors can be stopped, whatever else is.
+    stop_rad_s2: f64,
+    tick_s: f64,
     /// Voltages of least square per number of ticks, once they are needed.
     least: Vec<OnceLock<Option<Vec<State>>>>,
     /// Scales of the states, so that none is lost beside another.
@@ -67,6 +74,8 @@ impl<'a> FlyBy<'a> {
             gains,
             voltage_max_v: free * scanner.voltage_max_v,
             current_max_a,
+            stop_rad_s2: STOP_SHARE * speed / tick_s,
+            tick_s,
             least: vec![OnceLock::new(); N_TICKS_MAX + 1],
             units: State::new(speed * tick_s, speed, speed * tick_s, speed, scanner.current_max_a),
         }
@@ -144,6 +153,24 @@ impl<'a> FlyBy<'a> {
             }
         }
         Some(voltages)
+    }
+
+    /// Whether mirrors that move so are so far from their greatest angles that stopping is no
+    /// question: with a part of the torque, begun late.
+    pub(super) fn has_room(&self, states: &States) -> bool {
+        let Self { machine, stop_rad_s2, tick_s, .. } = *self;
+        let angle_max_rad =
+            (1.0 - ftheta_physics::audit::CORRECTION_RESERVE) * machine.scanner.angle_max_rad;
+        states.iter().all(|state| {
+            let speed = self.speed_row.dot(state).abs();
+            let way_rad = speed * (0.5 * speed / stop_rad_s2 + STOP_TICKS * tick_s);
+            self.mirror_row.dot(state).abs() + way_rad < angle_max_rad
+        })
+    }
+
+    /// Greatest voltage, V, and current, A.
+    pub(super) fn most(&self) -> (f64, f64) {
+        (self.voltage_max_v, self.current_max_a)
     }
 
     /// A state one tick later.

@@ -21,6 +21,11 @@ impl Heat {
         }
     }
 
+    /// The same coils, cold.
+    pub(super) fn cold(&self) -> Self {
+        Self { heat_a2: [0.0; 2], ..self.clone() }
+    }
+
     /// A tick with these currents at its end.
     pub(super) fn tick(&mut self, currents_a: [f64; 2]) {
         for (heat, current) in self.heat_a2.iter_mut().zip(currents_a) {

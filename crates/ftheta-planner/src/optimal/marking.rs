@@ -1,20 +1,20 @@
 //! One mark after the other: its speed, its corners, its light.
 
 use super::path::Path;
-use super::speed::{SpeedLimits, averaged_mm, profile, time_at_s};
+use super::pieces::Piece;
+use super::speed::{SpeedLimits, averaged_mm, time_at_s};
 use super::turn::{Allowance, Turn, candidates, straight_mm};
-use super::weave::{Laid, Stretch, Weave};
+use super::weave::{Stretch, Weave};
 use super::{Corner, N_REST_TICKS, OptimalOptions};
 use crate::PlanError;
 use crate::corner::Corners;
-use ftheta_model::plan::{Knot, PlannedMark};
+use ftheta_model::plan::PlannedMark;
 use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Mark;
 use ftheta_physics::audit::CORRECTION_RESERVE;
 use ftheta_physics::follow::TAPS_AFTER;
 use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::scale_mm_per_rad;
-use std::borrow::Cow;
 
 /// Part of the tolerance by which a plan itself may miss a curve; the rest is for the machine.
 const MISS_SHARE: f64 = 0.85;
@@ -49,14 +49,6 @@ pub(super) struct Marking<'a> {
     pub(super) galvo: Galvo,
     /// How long the beam runs at mark speed before and after light, s.
     pub(super) run_s: [f64; 2],
-}
-
-/// A stretch between two turns, and the turn after it.
-struct Piece<'a> {
-    stretch: Stretch<'a>,
-    laid: Laid,
-    /// Its speed as a part of what was asked for.
-    part: f64,
 }
 
 /// A mark as it is made: stretches, and between each two a turn with its voltages.
@@ -146,10 +138,14 @@ impl Marking<'_> {
         // Light that ends later than it begins cannot be shorter than that.
         limits.speed_mm_s = limits.speed_mm_s.min(path.length_mm() / self.light_min_s());
         for _ in 0..N_SLOWER {
+            let tables = self.weave.tables();
             let stroke = self.laid(&path, &limits, &place)?;
-            if self.weave.fly_to(&stroke.pieces[0].laid)? {
+            let last =
+                stroke.pieces.last().map_or(Ok(true), |last| self.weave.can_leave(&last.laid));
+            if last? && self.weave.fly_to(&stroke.pieces[0].laid)? {
                 return self.lit(mark, &path, pen, &stroke);
             }
+            self.weave.take_back(tables);
             limits.speed_mm_s *= SLOWER;
         }
         Err(PlanError::NoRoom { place })
@@ -269,61 +265,6 @@ impl Marking<'_> {
         candidates(path, limits.speed_mm_s, self.weave.smoothing, limit)
     }
 
-    /// The stretches between turns.
-    fn pieces<'p>(
-        &mut self,
-        path: &'p Path,
-        turns: &[Turn],
-        limits: &SpeedLimits,
-        place: &str,
-    ) -> Result<Vec<Piece<'p>>, PlanError> {
-        let mut pieces = Vec::with_capacity(turns.len() + 1);
-        let last_vertex = path.vertices.len() - 1;
-        for index in 0..=turns.len() {
-            let before = index.checked_sub(1).map(|before| &turns[before]);
-            let after = turns.get(index);
-            let from = before.map_or(0, |turn| turn.vertex);
-            let to = after.map_or(last_vertex, |turn| turn.vertex);
-            let path = match turns.is_empty() {
-                true => Cow::Borrowed(path),
-                false => Cow::Owned(path.part(from, to)),
-            };
-            let knots = profile(&path, limits, self.weave.smoothing);
-            let whole_s = time_at_s(&knots, path.length_mm());
-            let starts_s = before.map_or(-self.run_s[0], |turn| turn.runs_s()[1]);
-            let ends_s = after.map_or(0.0, |turn| turn.runs_s()[0]);
-            let period_s = self.weave.period_s();
-            let left_s = whole_s - starts_s - ends_s;
-            let (n_ticks, factor) = match after {
-                None => {
-                    let n_ticks = ((left_s + self.run_s[1]) / period_s - 1e-6).ceil().max(1.0);
-                    (n_ticks, 1.0)
-                }
-                Some(_) => {
-                    let n_ticks = (left_s / period_s - 1e-6).ceil().max(1.0);
-                    let all_s = n_ticks * period_s + starts_s + ends_s;
-                    (n_ticks, all_s / whole_s)
-                }
-            };
-            let knots = knots
-                .into_iter()
-                .map(|knot| Knot {
-                    time_s: knot.time_s * factor - starts_s,
-                    speed_mm_s: knot.speed_mm_s / factor,
-                    ..knot
-                })
-                .collect();
-            let limit = u32::MAX;
-            if n_ticks > f64::from(limit) {
-                return Err(PlanError::TooLong { place: place.into(), value: n_ticks, limit });
-            }
-            let stretch = Stretch { path, knots, n_ticks: n_ticks as u32 };
-            let laid = self.weave.lay(&stretch)?;
-            pieces.push(Piece { stretch, laid, part: factor.recip() });
-        }
-        Ok(pieces)
-    }
-
     /// Voltages of the turns, joined exactly to the stretches on both sides; `None` if that is more
     /// than the motors stand.
     fn joints(&self, pieces: &[Piece<'_>], turns: &[Turn]) -> Option<Vec<Vec<[f64; 2]>>> {
@@ -353,7 +294,10 @@ impl Marking<'_> {
         let (smoothing, period_s) = (self.weave.smoothing, self.weave.period_s());
         let around_mm = averaged_mm(knots, smoothing, n_ticks, period_s);
         let near_mm = NEAR * self.options.tolerance_mm;
-        path.nearest_mm(&self.weave.places(&piece.laid), &around_mm, near_mm)
+        match &piece.places {
+            Some(places) => path.nearest_mm(places, &around_mm, near_mm),
+            None => path.nearest_mm(&self.weave.places(&piece.laid), &around_mm, near_mm),
+        }
     }
 
     /// Shortest light that the laser can give, s.

@@ -5,6 +5,7 @@
 //! mean square of the averaged time. What several vertices within that time miss adds up.
 
 use super::path::{Path, angle};
+use super::relief::Relief;
 use super::smoothing::{Smoothing, shares};
 use ftheta_model::plan::Knot;
 
@@ -47,16 +48,24 @@ struct Turn {
 
 /// A place with its greatest speed, and how long to stay there.
 #[derive(Clone, Copy, Debug)]
-struct Limit {
-    at_mm: f64,
-    speed_mm_s: f64,
-    wait_s: f64,
+pub(super) struct Limit {
+    pub(super) at_mm: f64,
+    pub(super) speed_mm_s: f64,
+    pub(super) wait_s: f64,
 }
 
-/// The speed profile of a path: at least one knot.
-pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) -> Vec<Knot> {
+/// The speed profile of a path, at least one knot; and whether its speed is constant and all that
+/// turns within reach of any place is too little to strain a motor.
+pub(super) fn profile(
+    path: &Path,
+    limits: &SpeedLimits,
+    smoothing: &Smoothing,
+    relief: &Relief,
+) -> (Vec<Knot>, bool) {
     let acceleration_mm_s2 =
         limits.acceleration_mm_s2.min(ACCELERATION_SHARE * limits.miss_mm / smoothing.variance_s2);
+    let acceleration_mm_s2 = relief.acceleration_share * acceleration_mm_s2;
+    let mut calm = relief.is_none();
     let turns = turns(path, LUMP_SHARE * limits.speed_mm_s * smoothing.half_s);
     let mut slow: Vec<Limit> = Vec::new();
     let mut passing = Passing::new(&turns, limits, smoothing, acceleration_mm_s2);
@@ -69,6 +78,7 @@ pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) 
         } else if turned_rad < calm_rad {
             limits.speed_mm_s
         } else {
+            calm = false;
             passing.speed_mm_s(index)
         };
         let wait_s = if speed_mm_s == 0.0 { 2.0 * smoothing.half_s } else { 0.0 };
@@ -76,7 +86,12 @@ pub(super) fn profile(path: &Path, limits: &SpeedLimits, smoothing: &Smoothing) 
             slow.push(Limit { at_mm: turn.at_mm, speed_mm_s, wait_s });
         }
     }
-    knots(path.length_mm(), slow, limits.speed_mm_s, acceleration_mm_s2)
+    calm &= slow.is_empty();
+    if !relief.slow.is_empty() {
+        slow.extend(relief.slow.iter().filter(|limit| limit.speed_mm_s < limits.speed_mm_s));
+        slow.sort_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
+    }
+    (knots(path.length_mm(), slow, limits.speed_mm_s, acceleration_mm_s2), calm)
 }
 
 /// Where the path turns, with half of every curved leg's bend counted at each of its ends.

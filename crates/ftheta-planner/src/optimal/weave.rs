@@ -4,20 +4,24 @@ use super::fly_by::{FlyBy, States, Voltages};
 use super::glide::Glide;
 use super::heat::Heat;
 use super::path::Path;
+use super::relief::Strain;
 use super::smoothing::Smoothing;
 use crate::PlanError;
-use crate::render::track::{angles_around, places};
+use crate::render::track::{angles_around, places, places_around};
 use ftheta_model::block::LaserEdge;
 use ftheta_model::machine::Machine;
 use ftheta_model::plan::{Knot, Motion, PlanDraft, PlannedMark, Segment};
-use ftheta_physics::follow::Inverse;
+use ftheta_physics::follow::{Inverse, N_TAPS, TAPS_AFTER, TAPS_BEFORE, dot};
 use ftheta_physics::galvo::{CURRENT, State};
-use ftheta_physics::optics::angles_from_field;
+use ftheta_physics::optics::{angles_from_field, scale_mm_per_rad};
 use kurbo::Point;
 use std::borrow::Cow;
 
 /// Changes of power below this part of it are left out.
 const POWER_STEP: f64 = 2e-3;
+
+/// Part of what driver and coils stand up to which no track needs a closer look.
+const NO_STRAIN: f64 = 0.8;
 
 /// What moves the mirrors between marks.
 pub(super) enum Mover<'a> {
@@ -144,6 +148,18 @@ impl<'a> Weave<'a> {
         Ok(Laid { motion, n_ticks, starts, ends })
     }
 
+    /// How full the tables are, for [`Self::take_back`].
+    pub(super) fn tables(&self) -> [usize; 3] {
+        [self.draft.vertices.len(), self.draft.stations.len(), self.draft.knots.len()]
+    }
+
+    /// Takes out of the tables what has been put into them since.
+    pub(super) fn take_back(&mut self, [n_vertices, n_stations, n_knots]: [usize; 3]) {
+        self.draft.vertices.truncate(n_vertices);
+        self.draft.stations.truncate(n_stations);
+        self.draft.knots.truncate(n_knots);
+    }
+
     /// The states of both axes at a tick of a track.
     fn states_at(&self, motion: &Motion, tick: u32) -> Result<States, PlanError> {
         let optics = &self.machine.optics;
@@ -161,6 +177,22 @@ impl<'a> Weave<'a> {
     /// If a program fails.
     pub(super) fn fly_to(&mut self, laid: &Laid) -> Result<bool, PlanError> {
         self.fly(laid.starts)
+    }
+
+    /// Whether there is room to stop after a track, at any heat.
+    ///
+    /// # Errors
+    /// If a program fails.
+    pub(super) fn can_leave(&self, laid: &Laid) -> Result<bool, PlanError> {
+        let rest = [State::zeros(); 2];
+        match self.mover {
+            Mover::Voltage(fly_by) if !fly_by.has_room(&laid.ends) => {
+                let cold = self.heat.cold();
+                Ok(fly_by.between([&laid.ends, &rest], &cold, 0)?.is_some())
+            }
+            Mover::Voltage(_) => Ok(true),
+            Mover::Angle(glide, _) => Ok(glide.between(&laid.ends, &rest, 0).is_some()),
+        }
     }
 
     /// Flies to rest in the centre.
@@ -258,6 +290,65 @@ impl<'a> Weave<'a> {
         }
         self.draft.marks.push(mark);
         Ok(())
+    }
+
+    /// Places of the beam at every tick of a track, with what weights need before and after them.
+    pub(super) fn places_around(&self, laid: &Laid) -> Vec<Point> {
+        places_around(&self.draft, &laid.motion, laid.n_ticks)
+    }
+
+    /// Without what weights need.
+    pub(super) fn without_taps(&self, mut places: Vec<Point>) -> Vec<Point> {
+        places.truncate(places.len() - TAPS_AFTER);
+        places.drain(..TAPS_BEFORE);
+        places
+    }
+
+    /// Ticks at which a track asks driver or coils for more than they stand.
+    ///
+    /// * `places`: with those that weights need
+    pub(super) fn strains(&self, places: &[Point], n_ticks: u32) -> Vec<Strain> {
+        let Mover::Voltage(fly_by) = self.mover else {
+            return Vec::new();
+        };
+        let (voltage_max_v, current_max_a) = fly_by.most();
+        let optics = &self.machine.optics;
+        let per_mm = scale_mm_per_rad(optics).recip();
+        let mut x: Vec<f64> = places.iter().map(|place| place.x * per_mm).collect();
+        let mut y: Vec<f64> = places.iter().map(|place| place.y * per_mm).collect();
+        let (voltage, current) = (&self.inverse.voltage, &self.inverse.state[CURRENT]);
+        let ratio_at = |x: &[f64], y: &[f64]| {
+            let volts = dot(voltage, x).abs().max(dot(voltage, y).abs());
+            let amperes = dot(current, x).abs().max(dot(current, y).abs());
+            (volts / voltage_max_v).max(amperes / current_max_a)
+        };
+        let windows = || x.windows(N_TAPS).zip(y.windows(N_TAPS));
+        // The optics are not what their scale says, by a few per cent; most tracks need no more.
+        if windows().all(|(x, y)| ratio_at(x, y) < NO_STRAIN) {
+            return Vec::new();
+        }
+        for ((x, y), &place) in x.iter_mut().zip(&mut y).zip(places) {
+            if let Some(angles) = angles_from_field(optics, place.into()) {
+                (*x, *y) = (angles.x_rad, angles.y_rad);
+            }
+        }
+        let strain = |(tick, (x, y)): (usize, (&[f64], &[f64]))| {
+            let ratio = ratio_at(x, y);
+            (ratio > 1.0).then(|| {
+                let way = [x, y].map(|one| one[TAPS_BEFORE + 1] - one[TAPS_BEFORE - 1]);
+                let volts = [dot(voltage, x), dot(voltage, y)];
+                let along = (volts[0] * way[0] + volts[1] * way[1]).abs();
+                let across = (volts[0] * way[1] - volts[1] * way[0]).abs();
+                Strain { tick, ratio, along: along > across }
+            })
+        };
+        let ticks = n_ticks as usize + 1;
+        x.windows(N_TAPS)
+            .zip(y.windows(N_TAPS))
+            .take(ticks)
+            .enumerate()
+            .filter_map(strain)
+            .collect()
     }
 
     /// Places of the beam at every tick of a track, from the first to the end.

@@ -105,6 +105,11 @@ pub(crate) fn places(plan: &PlanDraft, motion: &Motion, n_ticks: u32) -> Vec<Poi
     averaged(plan, motion, 0.0, n_ticks as usize + 1)
 }
 
+/// The same, with those that weights need before the first and after the last one.
+pub(crate) fn places_around(plan: &PlanDraft, motion: &Motion, n_ticks: u32) -> Vec<Point> {
+    averaged(plan, motion, -(TAPS_BEFORE as f64), n_ticks as usize + N_TAPS)
+}
+
 /// Wanted mirror angles of each axis around a tick of a track's profile; `Err` with a place that
 /// `angles` does not reach.
 pub(crate) fn angles_around(
