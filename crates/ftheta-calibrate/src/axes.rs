@@ -44,8 +44,11 @@ impl Axes {
             y_reversed: index & 4 != 0,
             ..Self::straight(optics.first_mirror)
         });
-        let mut ways: Vec<_> =
-            ways.map(|way| ((linear / linear.norm().max(1e-9) * 2f64.sqrt() - way.matrix()).norm(), way)).collect();
+        let mut ways: Vec<_> = ways
+            .map(|way| {
+                ((linear / linear.norm().max(1e-9) * 2f64.sqrt() - way.matrix()).norm(), way)
+            })
+            .collect();
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, mut axes) = ways[0];
         axes.margin = ways[1].0 / best.max(1e-9);

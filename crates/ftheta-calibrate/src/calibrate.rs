@@ -1,7 +1,7 @@
 //! The entry: marks in, a calibration out.
 
-use crate::accuracy::distance_mm;
 pub use crate::accuracy::Spread;
+use crate::accuracy::distance_mm;
 use crate::axes::Axes;
 use crate::error::CalibrateError;
 use crate::mark::Mark;
@@ -156,8 +156,12 @@ pub fn calibrate(
     warnings.extend(axis_warnings(optics, &axes));
     let singular = CalibrateError::Singular { model: "physical", n_marks };
     let physical = fit(optics, axes, marks, options.noise).ok_or(singular)?;
-    let clean: Vec<Mark> =
-        marks.iter().zip(&physical.used).filter(|(_, used)| **used).map(|(mark, _)| *mark).collect();
+    let clean: Vec<Mark> = marks
+        .iter()
+        .zip(&physical.used)
+        .filter(|(_, used)| **used)
+        .map(|(mark, _)| *mark)
+        .collect();
     let (model, why, surface) = choose(optics, &physical, &clean, options)?;
     let outliers = (0..n_marks).filter(|&index| !physical.used[index]).collect();
     let n_rounds = marks.iter().map(|mark| mark.round).max().unwrap_or(0);
@@ -247,7 +251,9 @@ fn axis_warnings(optics: &Optics, axes: &Axes) -> Vec<Warning> {
     }
     if axes.margin < AXES_MARGIN {
         let margin = axes.margin;
-        warn(format!("the way the axes run is doubtful: the next best is only {margin:.1} times off"));
+        warn(format!(
+            "the way the axes run is doubtful: the next best is only {margin:.1} times off"
+        ));
     }
     if axes.first_mirror != optics.first_mirror {
         let name = if axes.first_mirror == Axis::X { "x" } else { "y" };
@@ -320,7 +326,8 @@ impl Calibration {
             let mut kept = surface.left_out_mm.iter();
             for (index, mark) in marks.iter().enumerate() {
                 let place = surface.place(mark.command);
-                let off = Vector2::new(mark.measured.x_mm - place.x_mm, mark.measured.y_mm - place.y_mm);
+                let off =
+                    Vector2::new(mark.measured.x_mm - place.x_mm, mark.measured.y_mm - place.y_mm);
                 left[index] = if used[index] { *kept.next().unwrap_or(&off) } else { off };
             }
         }

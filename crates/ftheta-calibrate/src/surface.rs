@@ -120,8 +120,7 @@ impl Surface {
             marks.iter().map(|mark| self.nominal(mark.command)).collect();
         let reach = nominal.iter().map(|p| p.x_mm.abs().max(p.y_mm.abs())).fold(1e-3, f64::max);
         let left = |index: usize, mark: &Mark| {
-            let (measured, place) =
-                (self.axes.head(mark.measured), self.head_place(mark.command));
+            let (measured, place) = (self.axes.head(mark.measured), self.head_place(mark.command));
             [measured.x_mm - place.x_mm, measured.y_mm - place.y_mm][index]
         };
         let errors = [0, 1].map(|index| {
@@ -142,7 +141,8 @@ impl Surface {
             let place = [nominal.x_mm / part.half_mm, nominal.y_mm / part.half_mm];
             for (index, sum) in sum.iter_mut().enumerate() {
                 let terms = part.basis.terms(place, index);
-                *sum += terms.iter().zip(&part.coefficients[index]).map(|(t, c)| t * c).sum::<f64>();
+                *sum +=
+                    terms.iter().zip(&part.coefficients[index]).map(|(t, c)| t * c).sum::<f64>();
             }
         }
         FieldPoint::new(sum[0], sum[1])
@@ -188,7 +188,6 @@ impl Family {
 fn polynomials(n_marks: usize) -> Vec<(Basis, f64)> {
     let degrees = 1..=DEGREE_MAX;
     let all = degrees.flat_map(|degree| [Basis::Total(degree), Basis::Tensor(degree)]);
-    let fits =
-        |basis: &Basis| basis.n_terms() as f64 * MARKS_PER_COEFFICIENT <= n_marks as f64;
+    let fits = |basis: &Basis| basis.n_terms() as f64 * MARKS_PER_COEFFICIENT <= n_marks as f64;
     all.filter(fits).map(|basis| (basis, 0.0)).collect()
 }

@@ -4,9 +4,7 @@ use crate::calibrate::Calibration;
 use crate::error::CalibrateError;
 use ftheta_model::machine::Machine;
 use ftheta_model::space::{FieldPoint, MirrorAngles};
-use ftheta_physics::correction::{
-    About, CorrectionPlane, CorrectionTable, Drift, optics_id,
-};
+use ftheta_physics::correction::{About, CorrectionPlane, CorrectionTable, Drift, optics_id};
 use ftheta_physics::grid_map::{GridMap, Interpolation};
 use ftheta_physics::optics::field_from_angles;
 

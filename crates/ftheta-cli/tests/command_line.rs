@@ -414,3 +414,72 @@ fn a_pattern_is_written_and_compared() {
     let (code, converted) = bench.json(&["convert", "ilda.svg", "ilda.csv"]);
     assert_eq!(code, 0, "{converted}");
 }
+
+#[test]
+fn grids_to_measure_are_written_whole_or_refused() {
+    let bench = Bench::new();
+    let grid = ["pattern", "grid", "--machine", "S14-f420", "--out", "grid.svg", "--points"];
+    let (code, value) = bench.json(&[&grid[..], &["25", "--field", "280"]].concat());
+    assert_eq!((code, &value["points"]), (0, &25.into()), "{value}");
+    let pattern = fs::read_to_string(bench.path("grid.json")).unwrap();
+    let pattern: Value = serde_json::from_str(&pattern).unwrap();
+    let corner = &pattern["features"][24];
+    assert_eq!((&corner["kind"], &corner["id"]), (&"cross".into(), &"E5".into()));
+    assert_eq!((number(corner, &["x_mm"]), number(corner, &["y_mm"])), (140.0, 140.0));
+    assert_eq!(pattern["laser"]["on_us"], -20.0);
+    let csv = fs::read_to_string(bench.path("grid.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 26);
+    // The drawing is one like any other, and the recipe beside it is found.
+    let mark = ["mark", "grid.svg", "--machine", "S14-f420", "--planner", "classic"];
+    let (code, marked) = bench.json(&mark);
+    assert_eq!((code, &marked["limits"]["violations"]), (0, &0.into()), "{marked}");
+    let fault = bench.fault(&[&grid[..], &["25", "--field", "335"]].concat());
+    assert_eq!((&fault["value"], &fault["limit"]), (&"343 mm".into(), &"336 mm".into()));
+    for points in ["10", "4", "16", "4489", "x"] {
+        let run = bench.run(&[&grid[..], &[points, "--field", "280"]].concat());
+        assert_eq!(run.status.code(), Some(2), "{points}");
+    }
+    let square = ["pattern", "square", "--machine", "S14-f420", "--field", "120", "--out", "s.svg"];
+    assert_eq!(bench.json(&square).1["kind"], "square");
+}
+
+#[test]
+fn places_are_mapped_and_tables_converted() {
+    let bench = Bench::new();
+    bench.write("places.csv", "x_mm;y_mm\n0;0\n10,5;-20\n");
+    let map = ["field", "map", "--machine", "S10-f160", "--points"];
+    let (code, value) = bench.json(&[&map[..], &["places.csv", "--out", "angles.csv"]].concat());
+    assert_eq!((code, &value["points"]), (0, &2.into()), "{value}");
+    let back = [&map[..], &["angles.csv", "--out", "back.csv", "--inverse"]].concat();
+    assert_eq!(bench.json(&back).0, 0);
+    let back = fs::read_to_string(bench.path("back.csv")).unwrap();
+    let row: Vec<f64> =
+        back.lines().nth(2).unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!((row[0] - 10.5).abs() < 1e-8 && (row[1] + 20.0).abs() < 1e-8, "{back}");
+    bench.write("far.csv", "x_mm,y_mm\n0,0\n0,900\n");
+    let fault = bench.fault(&[&map[..], &["far.csv", "--out", "none.csv"]].concat());
+    assert_eq!(fault["where"], "far.csv: line 3");
+    assert!(!bench.path("none.csv").exists());
+    let header = "row,column,x_mm,y_mm,offset_x_mm,offset_y_mm\n";
+    let nodes = (0..9).map(|index: i32| {
+        let (row, column) = (index / 3, index % 3);
+        format!("{row},{column},{},{},0.1,-0.2\n", 60 * (column - 1), 60 * (row - 1))
+    });
+    bench.write("grid.csv", header.to_owned() + &nodes.collect::<String>());
+    for pair in [["grid.csv", "table.txt"], ["table.txt", "mine.cor"], ["mine.cor", "again.txt"]] {
+        let arguments = [&["convert"], &pair[..], &["--machine", "S10-f160"]].concat();
+        assert_eq!(bench.json(&arguments).0, 0, "{pair:?}");
+    }
+    let corrected = ["places.csv", "--table", "again.txt", "--out", "angles.csv"];
+    assert_eq!(bench.json(&[&map[..], &corrected[..]].concat()).1["corrected"], true);
+    let angles = fs::read_to_string(bench.path("angles.csv")).unwrap();
+    // 0.1 and -0.2 mm of twice the focal length, in whole units of the .cor file.
+    let centre: Vec<f64> =
+        angles.lines().nth(1).unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    let unit_deg = (120.0f64 / 65536.0 / 320.0).to_degrees();
+    assert!((centre[2] - (0.1f64 / 320.0).to_degrees()).abs() < unit_deg, "{angles}");
+    assert!((centre[3] + (0.2f64 / 320.0).to_degrees()).abs() < unit_deg, "{angles}");
+    let fault = bench.fault(&["convert", "table.txt", "mine.cor", "--machine", "S10-f163"]);
+    assert!(fault["message"].as_str().unwrap().contains("S10-f160"), "{fault}");
+    bench.fault(&["convert", "table.txt", "mine.cor"]);
+}

@@ -112,7 +112,7 @@ fn grids_that_are_none_are_refused() {
     let error = |from: &str, to: &str| {
         let changed = text.replacen(from, to, 1);
         assert_ne!(changed, text);
-        grid_csv::read("g.csv", changed.as_bytes()).unwrap_err().to_string()
+        format!("error | {}", grid_csv::read("g.csv", changed.as_bytes()).unwrap_err())
     };
     let found = [
         error("2,2,55.1,", "2,2,56,"),
@@ -124,13 +124,13 @@ fn grids_that_are_none_are_refused() {
         error("2,2,55.1,55.1", "# 2,2,55.1,55.1"),
     ];
     expect_test::expect![[r#"
-        g.csv:2: x_mm is -55.1, expected -55.55, as in an even grid with the field's centre in its own
-        g.csv:10: column is "3", expected a whole number, 0 to 2
-        g.csv:10: row is "2", expected a node of its own; row 2, column 1 was there before
-        g.csv:6: y_mm is "x", expected a finite number
-        g.csv:6: y_mm is empty, expected a finite number
-        g.csv:1: columns "row, column, x_mm, y_mm, offset_x_mm, offset_z_mm", expected row, column, x_mm, y_mm, offset_x_mm, offset_y_mm
-        g.csv: 8 rows, expected a square number of rows, 4 to 1050625"#]].assert_eq(&found.join("\n"));
+        error | g.csv:2: x_mm is -55.1, expected -55.55, as in an even grid with the field's centre in its own
+        error | g.csv:10: column is "3", expected a whole number, 0 to 2
+        error | g.csv:10: row is "2", expected a node of its own; row 2, column 1 was there before
+        error | g.csv:6: y_mm is "x", expected a finite number
+        error | g.csv:6: y_mm is empty, expected a finite number
+        error | g.csv:1: columns "row, column, x_mm, y_mm, offset_x_mm, offset_z_mm", expected row, column, x_mm, y_mm, offset_x_mm, offset_y_mm
+        error | g.csv: 8 rows, expected a square number of rows, 4 to 1050625"#]].assert_eq(&found.join("\n"));
     let nowhere = "row,column,x_mm,y_mm,offset_x_mm,offset_y_mm\n".to_owned()
         + "0,0,0,0,0,0\n0,1,0,0,0,0\n1,0,0,0,0,0\n1,1,0,0,0,0\n";
     assert!(grid_csv::read("g.csv", nowhere.as_bytes()).is_err());
@@ -138,7 +138,11 @@ fn grids_that_are_none_are_refused() {
 
 proptest! {
     #[test]
-    fn no_bytes_cause_a_panic(at in 0usize..33_840, with in any::<[u8; 8]>(), cut in 0usize..33_841) {
+    fn no_bytes_cause_a_panic(
+        at in 0usize..33_840,
+        with in any::<[u8; 8]>(),
+        cut in 0usize..33_841,
+    ) {
         let mut bytes = by_hand();
         for (byte, new) in bytes[at..].iter_mut().zip(with) {
             *byte = new;

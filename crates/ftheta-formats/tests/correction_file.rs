@@ -42,7 +42,16 @@ fn tables_are_read_as_written_bit_for_bit() {
         assert_eq!(bits(&read), bits(&table));
     }
     let head: Vec<String> = write(&table(DRIFT)).lines().take(8).map(String::from).collect();
-    expect![""].assert_eq(&head.join("\n"));
+    expect![[r#"
+        ftheta correction 1
+        machine "my \"head\"\n, µ" "0123456789abcdef"
+        model "physical"
+        rounds 3
+        drift gain 1.0000123 0.99999 offset_rad 3.3333333333333337e-6 -0.0
+        planes 2
+        plane z_mm -1.5 nodes 3 half_width_rad 0.2100000000000001 bilinear
+        -0.19740000000000008 -0.2142000000000001"#]]
+    .assert_eq(&head.join("\n"));
 }
 
 #[test]
@@ -95,7 +104,25 @@ fn the_line_at_fault_is_named() {
         read(b"ftheta correction 1\n\xff").unwrap_err().to_string(),
         read(whole.replace('\n', "\r\n").as_bytes()).unwrap_err().to_string(),
     ];
-    expect![""].assert_eq(&found.join("\n"));
+    expect![[r#"
+        line 1: "ftheta correction 2" is not ftheta correction 1
+        line 2: "machine \"my \\\"head\\\"\\n, µ\" 0123" is not machine "NAME" "ID"
+        line 4: "rounds -3" is not rounds N
+        line 5: "drift gains 1.0000123 0.99999 offset_rad 3.3333333333333337e" is not drift gain X Y offset_rad X Y
+        line 5: "drift gain 1.0000123 0.99999 offset_rad NaN3.333333333333333" is not drift gain X Y offset_rad X Y
+        line 6: "planes 0" is not planes N, N from 1 to 64
+        line 6: "planes 99999999999999999999" is not planes N, N from 1 to 64
+        line 7: "plane z_mm -1.5 nodes 2 half_width_rad 0.2100000000000001 bi" is not plane z_mm Z nodes N half_width_rad W and bilinear or catmull-rom, N from 3 to 1025, W above 0
+        line 7: "plane z_mm -1.5 nodes 60000 half_width_rad 0.210000000000000" is not plane z_mm Z nodes N half_width_rad W and bilinear or catmull-rom, N from 3 to 1025, W above 0
+        line 17: "plane z_mm 0.3333333333333333 nodes 5 half_width_rad 0.21000" is not two angles in rad
+        line 7: "plane z_mm -1.5 nodes 3 half_width_rad 0.2100000000000001 ne" is not plane z_mm Z nodes N half_width_rad W and bilinear or catmull-rom, N from 3 to 1025, W above 0
+        line 7: "plane z_mm -1.5 nodes 3 half_width_rad -0.2100000000000001 b" is not plane z_mm Z nodes N half_width_rad W and bilinear or catmull-rom, N from 3 to 1025, W above 0
+        line 43: "sha256 005c2af76201fd2edd37db7749cbe9ba0a35d51a3abb08154f849" is not sha256 and 64 hexadecimal digits
+        line 43: the checksum is not that of the lines above it: the file was changed
+        line 44: "more" is not the end of the file
+        line 1: the end of the file is not ftheta correction 1
+        byte 20 is not text
+        line 1: "ftheta correction 1\r" is not ftheta correction 1"#]].assert_eq(&found.join("\n"));
 }
 
 /// A file whose checksum is right and whose table folds over.

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 fn shown(bytes: &[u8]) -> String {
     let read = match read("m.csv", bytes) {
         Ok(read) => read,
-        Err(error) => return format!("error: {error}"),
+        Err(error) => return format!("error | {error}"),
     };
     let mut out = String::new();
     let mut line = |first: [f64; 2], measured: [f64; 2], round: u32, line: u32| {
@@ -24,7 +24,7 @@ fn shown(bytes: &[u8]) -> String {
             line(p.command_units, [p.measured_mm.x_mm, p.measured_mm.y_mm], p.round, p.line);
         }),
     }
-    read.warnings.iter().for_each(|warning| out.push_str(&format!("warning {warning}\n")));
+    read.warnings.iter().for_each(|warning| out.push_str(&format!("warning | {warning}\n")));
     out
 }
 
@@ -96,7 +96,7 @@ fn tables_of_other_programs_are_known() {
         expect![[r#"
             1: [-10.0, -10.0] [-9.5, -10.25] round 1
             2: [10.0, 10.0] [9.5, 10.25] round 1
-            warning m.csv: 4 columns without names, taken as target_x_mm in 1, target_y_mm in 2, measured_x_mm in 3, measured_y_mm in 4
+            warning | m.csv: 4 columns without names, taken as target_x_mm in 1, target_y_mm in 2, measured_x_mm in 3, measured_y_mm in 4
         "#]],
     );
     // Row, column, nominal place and error.
@@ -105,7 +105,7 @@ fn tables_of_other_programs_are_known() {
         expect![[r#"
             1: [-10.0, 10.0] [-9.5, 9.75] round 1
             2: [0.0, 10.0] [0.0, 10.125] round 1
-            warning m.csv: 6 columns without names, taken as target_x_mm in 3, target_y_mm in 4, error_x_mm in 5, error_y_mm in 6
+            warning | m.csv: 6 columns without names, taken as target_x_mm in 3, target_y_mm in 4, error_x_mm in 5, error_y_mm in 6
         "#]],
     );
     check(
@@ -120,7 +120,7 @@ fn tables_of_other_programs_are_known() {
         expect![[r#"
             1: [-24576.0, -24576.0] [-63.25, -67.3] round 1
             2: [0.0, 6144.0] [0.0, 16.52] round 1
-            warning m.csv: 6 columns without names, taken as galvo_x in 5, galvo_y in 6, measured_x_mm in 1, measured_y_mm in 2
+            warning | m.csv: 6 columns without names, taken as galvo_x in 5, galvo_y in 6, measured_x_mm in 1, measured_y_mm in 2
         "#]],
     );
     // Commands in bits below settings.
@@ -130,8 +130,8 @@ fn tables_of_other_programs_are_known() {
         expect![[r#"
             5: [-20000.0, 20000.0] [-51.5, 48.25] round 1
             6: [0.0, 0.0] [0.0, 0.0] round 1
-            warning m.csv: 4 columns without names, taken as rtc_x in 1, rtc_y in 2, measured_x_mm in 3, measured_y_mm in 4
-            warning m.csv:1: 2 lines that set a value are not used
+            warning | m.csv: 4 columns without names, taken as rtc_x in 1, rtc_y in 2, measured_x_mm in 3, measured_y_mm in 4
+            warning | m.csv:1: 2 lines that set a value are not used
         "#]],
     );
     let bits = read("m.csv", b"RTC-X [Bit],RTC-Y [Bit],REAL-X [mm],REAL-Y [mm]\n-200,100,-1,2\n");
@@ -152,9 +152,9 @@ fn unmeasured_and_repeated_rows_are_told() {
             2: [0.0, 0.0] [1.0, 1.0] round 1
             4: [0.0, 0.0] [2.0, 2.0] round 1
             5: [-0.0, 0.0] [3.0, 3.0] round 2
-            warning m.csv: columns note are not used
-            warning m.csv: rows left out for want of a measured place: 2
-            warning m.csv:4: same target and round as line 2; both are kept
+            warning | m.csv: columns note are not used
+            warning | m.csv: rows left out for want of a measured place: 2
+            warning | m.csv:4: same target and round as line 2; both are kept
         "#]],
     );
 }
@@ -189,34 +189,34 @@ fn what_is_wrong_is_named() {
     ];
     let found: Vec<String> = cases.iter().map(|text| shown(text.as_bytes())).collect();
     expect![[r#"
-        error: m.csv: no rows, expected rows of target and measured place
-        error: m.csv: no rows, expected rows of target and measured place
-        error: m.csv: no row with a measured place, expected rows of target and measured place
-        error: m.csv:1: columns "target_x_mm, target_y_mm, measured_x_mm", expected target_x_mm, target_y_mm, measured_x_mm, measured_y_mm and perhaps round, each once
-        error: m.csv:1: columns "target_x_mm, target_y_mm, measured_x_mm, measured_y_mm, targ...", expected target_x_mm, target_y_mm, measured_x_mm, measured_y_mm and perhaps round, each once
-        error: m.csv:1: columns "target_x_inch, target_y_inch, measured_x_inch, measured_y_in...", expected target_x_mm, target_y_mm, measured_x_mm, measured_y_mm and perhaps round, each once
-        error: m.csv:1: columns without names, 3 of them, expected 4 (target x, y, measured x, y in mm; or commands in bits and measured), 5 (a round as well) or 6 (row, column, nominal x, y, error x, y; or measured x, y, i, j and hexadecimal galvo x, y)
-        error: m.csv:3: measured_y_mm is empty, expected a finite number
-        error: m.csv:3: measured_y_mm is empty, expected a finite number
-        error: m.csv:3: target_x_mm is empty, expected a finite number
-        error: m.csv:3: measured_y_mm is "abc", expected a finite number
-        error: m.csv:3: measured_y_mm is "NaN", expected a finite number
-        error: m.csv:3: measured_x_mm is "-inf", expected a finite number
-        error: m.csv:3: measured_x_mm is "1e999", expected a finite number
-        error: m.csv:3: measured_x_mm is "1e7", expected -1000000 to 1000000
-        error: m.csv:3: round is "1.5", expected a whole number, 1 to 1000000
-        error: m.csv:3: round is "0", expected a whole number, 1 to 1000000
-        error: m.csv:3: round is empty, expected a whole number, 1 to 1000000
-        error: m.csv:3: 6 cells, expected 5; numbers with a decimal comma need quotes or semicolons between them
+        error | m.csv: no rows, expected rows of target and measured place
+        error | m.csv: no rows, expected rows of target and measured place
+        error | m.csv: no row with a measured place, expected rows of target and measured place
+        error | m.csv:1: columns "target_x_mm, target_y_mm, measured_x_mm", expected target_x_mm, target_y_mm, measured_x_mm, measured_y_mm and perhaps round, each once
+        error | m.csv:1: columns "target_x_mm, target_y_mm, measured_x_mm, measured_y_mm, targ...", expected target_x_mm, target_y_mm, measured_x_mm, measured_y_mm and perhaps round, each once
+        error | m.csv:1: columns "target_x_inch, target_y_inch, measured_x_inch, measured_y_in...", expected target_x_mm, target_y_mm, measured_x_mm, measured_y_mm and perhaps round, each once
+        error | m.csv:1: columns without names, 3 of them, expected 4 (target x, y, measured x, y in mm; or commands in bits and measured), 5 (a round as well) or 6 (row, column, nominal x, y, error x, y; or measured x, y, i, j and hexadecimal galvo x, y)
+        error | m.csv:3: measured_y_mm is empty, expected a finite number
+        error | m.csv:3: measured_y_mm is empty, expected a finite number
+        error | m.csv:3: target_x_mm is empty, expected a finite number
+        error | m.csv:3: measured_y_mm is "abc", expected a finite number
+        error | m.csv:3: measured_y_mm is "NaN", expected a finite number
+        error | m.csv:3: measured_x_mm is "-inf", expected a finite number
+        error | m.csv:3: measured_x_mm is "1e999", expected a finite number
+        error | m.csv:3: measured_x_mm is "1e7", expected -1000000 to 1000000
+        error | m.csv:3: round is "1.5", expected a whole number, 1 to 1000000
+        error | m.csv:3: round is "0", expected a whole number, 1 to 1000000
+        error | m.csv:3: round is empty, expected a whole number, 1 to 1000000
+        error | m.csv:3: 6 cells, expected 5; numbers with a decimal comma need quotes or semicolons between them
         2: [1.0, 2.0] [3.0, 4.0] round 1
         3: [1.0, 2.0] [3.5, 4.0] round 1
-        warning m.csv:3: same target and round as line 2; both are kept
+        warning | m.csv:3: same target and round as line 2; both are kept
 
-        error: m.csv:3: target_x_mm is "1.5", expected a finite number with a decimal comma, as in the rest of the file
-        error: m.csv:2: 8 cells, expected 4; numbers with a decimal comma need quotes or semicolons between them
-        error: m.csv:1: columns without names, 6 of them, expected 4 (target x, y, measured x, y in mm; or commands in bits and measured), 5 (a round as well) or 6 (row, column, nominal x, y, error x, y; or measured x, y, i, j and hexadecimal galvo x, y)"#]].assert_eq(&found.join("\n"));
-    assert!(shown(&[0xff, 0xfe, 0x00]).starts_with("error: m.csv: byte 2 is not text"));
-    assert!(shown(&[b'a', 0, b'b']).starts_with("error: m.csv: byte 1 is not text"));
+        error | m.csv:3: target_x_mm is "1.5", expected a finite number with a decimal comma, as in the rest of the file
+        error | m.csv:2: 8 cells, expected 4; numbers with a decimal comma need quotes or semicolons between them
+        error | m.csv:1: columns without names, 6 of them, expected 4 (target x, y, measured x, y in mm; or commands in bits and measured), 5 (a round as well) or 6 (row, column, nominal x, y, error x, y; or measured x, y, i, j and hexadecimal galvo x, y)"#]].assert_eq(&found.join("\n"));
+    assert!(shown(&[0xff, 0xfe, 0x00]).starts_with("error | m.csv: byte 2 is not text"));
+    assert!(shown(&[b'a', 0, b'b']).starts_with("error | m.csv: byte 1 is not text"));
     let error = read("m.csv", with("1,2,3,abc,1").as_bytes()).unwrap_err();
     let expected = ("m.csv:3: measured_y_mm".into(), "\"abc\"".into(), "a finite number".into());
     assert_eq!(error.fault(), expected);
@@ -237,7 +237,7 @@ fn lists_of_places_and_angles() {
             .map(|p| format!("{} {} {:?} {}", p.place_mm.x_mm, p.place_mm.y_mm, p.z_mm, p.line))
             .collect::<Vec<_>>()
             .join("; "),
-        Err(error) => error.to_string(),
+        Err(error) => format!("error | {error}"),
     };
     let found = [
         "x_mm,y_mm\n1,2\n3,4\n",
@@ -258,11 +258,11 @@ fn lists_of_places_and_angles() {
         1 2 None 1; 3 4 None 2
         1 2 Some(3.5) 1
         1.5 2 None 1
-        p.csv:1: columns "x_mm", expected x_mm, y_mm and perhaps z_mm, each once
-        p.csv:2: y_mm is empty, expected a finite number
-        p.csv:2: z_mm is empty, expected a finite number
-        p.csv:2: y_mm is "2e6", expected -1000000 to 1000000
-        p.csv: no rows, expected rows of x_mm, y_mm and perhaps z_mm, each once"#]]
+        error | p.csv:1: columns "x_mm", expected x_mm, y_mm and perhaps z_mm, each once
+        error | p.csv:2: y_mm is empty, expected a finite number
+        error | p.csv:2: z_mm is empty, expected a finite number
+        error | p.csv:2: y_mm is "2e6", expected -1000000 to 1000000
+        error | p.csv: no rows, expected rows of x_mm, y_mm and perhaps z_mm, each once"#]]
     .assert_eq(&found.join("\n"));
     let rows = "x_mm,y_mm,angle_x_deg,angle_y_deg\n1,2,90,-45\n";
     let angles = read_angles("a.csv", rows.as_bytes()).unwrap();
@@ -289,13 +289,13 @@ proptest! {
     /// Whatever separates and whichever decimal sign, the same numbers come back.
     #[test]
     fn numbers_are_read_bit_for_bit(
-        values in prop::collection::vec((-1e3f64..1e3, -1e3f64..1e3, -1e3f64..1e3, -1e3f64..1e3), 1..9),
+        values in prop::collection::vec(prop::array::uniform4(-1e3f64..1e3), 1..9),
         separator in prop::sample::select(vec![";", "\t", "  ", ","]),
         comma in any::<bool>(),
     ) {
         let mut text = HEADER.replace(',', separator) + "\n";
-        for (x, y, u, v) in &values {
-            let row = [x, y, u, v].map(|value| {
+        for row in &values {
+            let row = row.map(|value| {
                 let cell = value.to_string();
                 let cell = if comma { cell.replace('.', ",") } else { cell };
                 if separator == "," { format!("\"{cell}\"") } else { cell }
@@ -305,7 +305,7 @@ proptest! {
         let points = read("m.csv", text.as_bytes()).unwrap().value.measured(None).unwrap();
         let found: Vec<_> = points
             .iter()
-            .map(|p| (p.target_mm.x_mm, p.target_mm.y_mm, p.measured_mm.x_mm, p.measured_mm.y_mm))
+            .map(|p| [p.target_mm.x_mm, p.target_mm.y_mm, p.measured_mm.x_mm, p.measured_mm.y_mm])
             .collect();
         prop_assert_eq!(found, values);
     }

@@ -212,7 +212,8 @@ fn outliers(out: &mut String, points: &[ReportPoint]) {
     );
     for point in outliers.iter().take(N_ROWS_MAX) {
         let FieldPoint { x_mm, y_mm } = point.target_mm;
-        let [x, y] = point.error_after_mm;
+        // A zero from below has a sign that means nothing.
+        let [x, y] = point.error_after_mm.map(|error_mm| error_mm + 0.0);
         put(
             out,
             format_args!(
@@ -246,13 +247,21 @@ fn parameters(out: &mut String, parameters: &[ReportParameter]) {
             format_args!(
                 "<tr><td>{}</td><td class=n>{}</td><td class=n>{}</td><td>{}</td></tr>",
                 escaped(name),
-                number(*value),
-                sigma.map_or_else(String::new, number),
+                value_text(*value, *sigma),
+                sigma.map_or_else(String::new, |sigma| value_text(sigma, Some(sigma))),
                 escaped(unit)
             ),
         );
     }
     out.push_str("</table></section>");
+}
+
+/// A value with as many decimals as its deviation needs for two digits, or else six digits.
+fn value_text(value: f64, sigma: Option<f64>) -> String {
+    let known = sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0);
+    let finest = known.unwrap_or_else(|| value.abs().max(1e-9) * 1e-4);
+    let n_decimals = (1.0 - finest.log10().floor()).clamp(0.0, 12.0) as usize;
+    if value.is_finite() { format!("{value:.n_decimals$}") } else { "–".into() }
 }
 
 fn warnings(out: &mut String, warnings: &[Warning]) {

@@ -150,9 +150,7 @@ impl Beam {
 
     fn exact_place(&self, [x_rad, y_rad]: [f64; 2]) -> FieldPoint {
         match (&self.tracer, self.machine.optics.first_mirror) {
-            (None, _) => {
-                field_from_angles(&self.machine.optics, MirrorAngles::new(x_rad, y_rad))
-            }
+            (None, _) => field_from_angles(&self.machine.optics, MirrorAngles::new(x_rad, y_rad)),
             (Some(head), Axis::X) => head.place(MirrorAngles::new(x_rad, y_rad)),
             (Some(head), Axis::Y) => {
                 let place = head.place(MirrorAngles::new(y_rad, x_rad));

@@ -1,10 +1,9 @@
 //! Everything that can go wrong between a file and a marked field.
 
-use ftheta_calibrate::error::CalibrateError;
-use ftheta_physics::correction::CorrectionError;
 use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
+use ftheta_calibrate::error::CalibrateError;
 use ftheta_formats::cor_file::CorFileError;
 use ftheta_formats::correction_file::CorrectionFileError;
 use ftheta_formats::motion_law::MotionLawError;
@@ -14,6 +13,7 @@ use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::text_table::error::TableError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
+use ftheta_physics::correction::CorrectionError;
 use ftheta_physics::mechanism::MechanismError;
 use ftheta_physics::servo::ServoError;
 use ftheta_planner::PlanError;
@@ -67,6 +67,12 @@ pub enum Error {
     /// A table without the machine that it is for.
     #[error("{path}: a correction table is for one machine, name it with --machine", path = path.display())]
     NeedsMachine {
+        /// The table.
+        path: PathBuf,
+    },
+    /// A table that a user has filled in and that would be written over.
+    #[error("{path}: has measured places in it; move it away, or choose another name", path = path.display())]
+    Filled {
         /// The table.
         path: PathBuf,
     },
@@ -233,6 +239,9 @@ impl Error {
             }
             Self::NeedsMachine { path } => {
                 (path.display().to_string(), "no --machine".into(), "a preset or a file".into())
+            }
+            Self::Filled { path } => {
+                (path.display().to_string(), "measured places".into(), "none, or no file".into())
             }
             Self::Svg { path, source } => in_file(path, source.fault()),
             Self::Toml(error) => error.fault(),

@@ -166,16 +166,18 @@ pub fn places_of(
     rows.iter().map(|row| mapped(row.angles).map_err(|what| at(row.line, what))).collect()
 }
 
-/// Places and angles as CSV: `x_mm,y_mm,angle_x_deg,angle_y_deg[,focus_mm]`, degrees mechanical
-/// with ten decimals.
+/// Places and angles as CSV: `x_mm,y_mm,angle_x_deg,angle_y_deg[,focus_mm]`, lengths to nine
+/// decimals, degrees mechanical with ten.
 pub fn csv(rows: &[Mapped]) -> String {
     let has_focus = rows.iter().any(|row| row.focus_mm.is_some());
     let mut out = String::from("x_mm,y_mm,angle_x_deg,angle_y_deg");
     out.push_str(if has_focus { ",focus_mm\n" } else { "\n" });
     for Mapped { place_mm, angles, focus_mm } in rows {
         let (x_deg, y_deg) = (angles.x_rad.to_degrees(), angles.y_rad.to_degrees());
+        // A picometre is what ten decimals of a degree are worth; a zero has no sign.
+        let [x_mm, y_mm] = [place_mm.x_mm, place_mm.y_mm].map(|mm| (mm * 1e9).round() / 1e9 + 0.0);
         // Writing to a string does not fail.
-        let _ = write!(out, "{},{},{x_deg:.10},{y_deg:.10}", place_mm.x_mm, place_mm.y_mm);
+        let _ = write!(out, "{x_mm},{y_mm},{x_deg:.10},{y_deg:.10}");
         if has_focus {
             let _ = write!(out, ",{:.9}", focus_mm.unwrap_or(0.0));
         }

@@ -202,7 +202,9 @@ fn command(
             let scale = 2.0 * focal_mm(&machine.optics);
             Ok(MirrorAngles::new(x_mm / scale, y_mm / scale))
         }
-        MarkedThrough::Table(table) => Ok(corrected(table, nominal()?, 0.0).map_err(|_| unreached())?),
+        MarkedThrough::Table(table) => {
+            Ok(corrected(table, nominal()?, 0.0).map_err(|_| unreached())?)
+        }
     }
 }
 
@@ -221,11 +223,13 @@ fn advice(calibration: &Calibration, marks: &[Mark]) -> Vec<String> {
     }
     if calibration.axes.turned() {
         advice.push(
-            "Check that the sheet lay the right way; if it did, the table turns the axes back".into(),
+            "Check that the sheet lay the right way; if it did, the table turns the axes back"
+                .into(),
         );
     }
     if calibration.model != Model::Physical && marks.len() >= Model::Physical.n_marks_min() {
-        advice.push("Leave out --model: the physical model is the better one for most heads".into());
+        advice
+            .push("Leave out --model: the physical model is the better one for most heads".into());
     }
     let now_mm = calibration.expected.rms_mm;
     for n_side in FORECASTS {
@@ -251,10 +255,8 @@ impl FieldCalibration {
     /// The page that shows it.
     pub fn report(&self, machine: &str) -> String {
         let calibration = &self.calibration;
-        let um = |spread: Spread| ErrorSummary {
-            rms: spread.rms_mm * 1e3,
-            max: spread.max_mm * 1e3,
-        };
+        let um =
+            |spread: Spread| ErrorSummary { rms: spread.rms_mm * 1e3, max: spread.max_mm * 1e3 };
         let points: Vec<_> = self.marks.iter().enumerate().map(|(i, m)| self.point(i, m)).collect();
         let map = &calibration.expected_map;
         let errors_um: Vec<f64> = map.errors_mm.iter().map(|error| error * 1e3).collect();

@@ -10,8 +10,8 @@ use crate::planning::Planning;
 use ftheta_model::calibration::MeasuredPoint;
 use ftheta_model::job::{Job, Layer, Paint, Shape};
 use ftheta_model::machine::{Machine, Optics};
-use ftheta_model::plan::Planner;
 use ftheta_model::pattern::{FeatureShape, MarkStyle, Pattern};
+use ftheta_model::plan::Planner;
 use ftheta_model::recipe::{Pen, Recipe};
 use ftheta_model::space::FieldPoint;
 use ftheta_physics::correction::CorrectionTable;
@@ -135,8 +135,7 @@ pub fn write(points: &[(String, MeasuredPoint)], pattern: &Path, out: &Path) -> 
     if points.is_empty() {
         return Err(Error::NoSights { path: pattern.into() });
     }
-    let mut text =
-        String::from("target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark\n");
+    let mut text = String::from("target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark\n");
     for (id, MeasuredPoint { target_mm, measured_mm, round, .. }) in points {
         let (x, y) = (target_mm.x_mm + 0.0, target_mm.y_mm + 0.0);
         let FieldPoint { x_mm, y_mm } = measured_mm;
@@ -190,15 +189,17 @@ fn crossings(lines: &[(usize, Line)]) -> Vec<Sight> {
                 let spare = TOUCH_MM / line.length();
                 (-spare..=1.0 + spare).contains(&share).then(|| {
                     let beside = BESIDE_MM / line.length();
-                    [(share - beside).max(ARMS[0] * beside), (share + beside).min(1.0 - ARMS[0] * beside)]
+                    [
+                        (share - beside).max(ARMS[0] * beside),
+                        (share + beside).min(1.0 - ARMS[0] * beside),
+                    ]
                 })
             };
             let (Some(part_a), Some(part_b)) = (touches(a), touches(b)) else {
                 continue;
             };
-            let known = found.iter().any(|sight| {
-                Point::from(sight.target).distance(place) < TOUCH_MM
-            });
+            let known =
+                found.iter().any(|sight| Point::from(sight.target).distance(place) < TOUCH_MM);
             if !known {
                 let seen = Seen::Crossing([(*first, part_a), (*second, part_b)]);
                 let id = format!("crossing-{}", found.len() + 1);

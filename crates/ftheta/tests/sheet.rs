@@ -136,7 +136,26 @@ fn files_go_together() {
         let path = &files.iter().find(|file| file.0 == kind).unwrap().1;
         std::fs::read_to_string(path).unwrap()
     };
-    expect![""].assert_eq(&(read("recipe") + &read("points")));
+    expect![[r##"
+        # How the pattern is marked. Dots are filled with lines this far apart.
+        [[pen]]
+        name = "pattern"
+        color = "#000000"
+        mark_speed_mm_s = 1000
+        power_w = 10
+        hatch_spacing_mm = 0.0560
+        target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark
+        -140,-140,,,1,A1
+        0,-140,,,1,B1
+        140,-140,,,1,C1
+        -140,0,,,1,A2
+        0,0,,,1,B2
+        140,0,,,1,C2
+        -140,140,,,1,A3
+        0,140,,,1,B3
+        140,140,,,1,C3
+    "##]]
+    .assert_eq(&(read("recipe") + &read("points")));
     let (recipe, beside) = ftheta::import::recipe_for(&out, None).unwrap();
     assert_eq!(beside, Some(folder.path().join("grid.recipe.toml")));
     let drawing = ftheta::import::drawing(&out, &recipe, &svg::SvgOptions::default()).unwrap();
@@ -147,6 +166,29 @@ fn files_go_together() {
     let points = points::read("grid.csv", filled.as_bytes()).unwrap();
     assert!(points.warnings.is_empty(), "{:?}", points.warnings);
     let Points::Measured(points) = points.value else { unreachable!("targets are in mm") };
+    // Made again it is the same, but not over what a user has measured.
+    grid(3, MarkStyle::Dot).write(&out).unwrap();
+    std::fs::write(out.with_extension("csv"), &filled).unwrap();
+    let error = grid(3, MarkStyle::Dot).write(&out).unwrap_err();
+    assert!(error.to_string().contains("grid.csv: has measured places"), "{error}");
+    assert_eq!(
+        ftheta::import::measured_points(&out.with_extension("csv"), None).unwrap().value.len(),
+        9
+    );
+    let made = grid(3, MarkStyle::Dot).pattern;
+    assert_eq!(ftheta::import::pattern(&out.with_extension("json")).unwrap(), made);
+    let bits = folder.path().join("bits.csv");
+    std::fs::write(&bits, "-2000 0 -5 0\n2000 0 5 0\n").unwrap();
+    assert!(
+        ftheta::import::measured_points(&bits, None)
+            .unwrap_err()
+            .to_string()
+            .contains("--units-per-mm")
+    );
+    assert_eq!(
+        ftheta::import::measured_points(&bits, Some(400.0)).unwrap().value[0].target_mm.x_mm,
+        -5.0
+    );
     assert_eq!((points.len(), points[8].target_mm.x_mm, points[8].line), (9, 140.0, 10));
     assert!(grid(3, MarkStyle::Dot).write(&folder.path().join("grid.txt")).is_err());
 }
@@ -168,7 +210,16 @@ fn grids_that_do_not_fit_are_refused() {
         error(&|o| (o.n_side, o.field_mm) = (65, 100.0)),
         square::sheet(400.0, &SheetProcess::of(&machine()), &machine()).unwrap_err().to_string(),
     ];
-    expect![""].assert_eq(&found.join("\n"));
+    expect![[r#"
+        a field of 330 mm with marks of 8 mm reaches over 338 mm, the machine's field is 336 mm
+        a field of NaN mm with marks of 8 mm reaches over NaN mm, the machine's field is 336 mm
+        marks of 22 mm are too large, 21 mm is the limit with 35 mm between centres
+        marks of 0.2 mm are too small for a spot of 0.08 mm, 0.32 mm is the limit
+        8 marks along a side, expected an odd number from 3 to 65
+        67 marks along a side, expected an odd number from 3 to 65
+        65 x 65 marks on 100 mm leave room for labels of 0.223 mm, 0.480 mm is the limit
+        a field of 400 mm with marks of 0 mm reaches over 400 mm, the machine's field is 336 mm"#]]
+    .assert_eq(&found.join("\n"));
 }
 
 #[test]

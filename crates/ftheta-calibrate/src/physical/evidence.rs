@@ -98,8 +98,7 @@ impl Sums {
                 .take_while(|&level| level <= NOISE_MM[1])
                 .collect(),
         };
-        let tried =
-            levels.iter().filter_map(|&noise_mm| self.at(Scales { noise_mm, residual_mm }));
+        let tried = levels.iter().filter_map(|&noise_mm| self.at(Scales { noise_mm, residual_mm }));
         tried.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 
@@ -130,9 +129,13 @@ impl Sums {
             - self.n_rows as f64 * (scales.noise_mm * (2.0 * std::f64::consts::PI).sqrt()).ln()
             - 0.5 * scale_prior;
         let estimate = solved.component_mul(&prior);
-        log_evidence
-            .is_finite()
-            .then_some(Posterior { scales, log_evidence, estimate, factor, prior })
+        log_evidence.is_finite().then_some(Posterior {
+            scales,
+            log_evidence,
+            estimate,
+            factor,
+            prior,
+        })
     }
 }
 

@@ -62,9 +62,8 @@ pub fn fit(optics: &Optics, axes: Axes, marks: &[Mark], noise: Noise) -> Option<
         let step = (&posterior.estimate - &estimate).amax();
         estimate.copy_from(&posterior.estimate);
         let still = step < SETTLED;
-        let wrong = (step < 1.0)
-            .then(|| wrong_mark(&equations, &sums, &posterior, &used, noise))
-            .flatten();
+        let wrong =
+            (step < 1.0).then(|| wrong_mark(&equations, &sums, &posterior, &used, noise)).flatten();
         if let Some(mark) = wrong {
             used[mark] = false;
         }
@@ -93,8 +92,12 @@ fn innovation(
     let predicted = &rows * &posterior.estimate;
     let data = equations.data_mm.fixed_rows::<2>(2 * mark);
     let covariance = posterior.covariance(&rows);
-    let covariance =
-        Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 0)], covariance[(1, 1)]);
+    let covariance = Matrix2::new(
+        covariance[(0, 0)],
+        covariance[(0, 1)],
+        covariance[(1, 0)],
+        covariance[(1, 1)],
+    );
     (data - Vector2::new(predicted[0], predicted[1]), covariance)
 }
 
@@ -187,8 +190,9 @@ impl Physical {
 
     /// Errors to expect at `places` with `more` marks measured as well, mm rms.
     pub fn forecast_mm(&self, more: &[MirrorAngles], places: &[MirrorAngles]) -> Option<f64> {
-        let turned =
-            |all: &[MirrorAngles]| -> Vec<_> { all.iter().map(|&c| self.model.axes.commands(c)).collect() };
+        let turned = |all: &[MirrorAngles]| -> Vec<_> {
+            all.iter().map(|&c| self.model.axes.commands(c)).collect()
+        };
         let marks = self.model.jacobian(&turned(more), &self.estimate);
         let posterior = self.sums.with(&marks).at(self.posterior.scales)?;
         let jacobian = self.model.jacobian(&turned(places), &self.estimate);

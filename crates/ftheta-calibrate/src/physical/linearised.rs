@@ -90,7 +90,12 @@ impl Model {
     }
 
     /// The head and residual of an estimate.
-    pub fn place(&self, tracer: &Tracer, estimate: &DVector<f64>, angles: MirrorAngles) -> FieldPoint {
+    pub fn place(
+        &self,
+        tracer: &Tracer,
+        estimate: &DVector<f64>,
+        angles: MirrorAngles,
+    ) -> FieldPoint {
         let command = self.axes.commands(angles);
         let place = tracer.place(command);
         let terms = self.residual.terms(command);

@@ -111,8 +111,8 @@ impl Parameters {
                 let focal_mm = coefficients_mm[0];
                 let known = coefficients_mm[1..].iter().any(|&c| c != 0.0);
                 let orders_mm = if known { [2.0, 5.0, 10.0] } else { [20.0, 100.0, 100.0] };
-                let [third_mm, fifth_mm, seventh_mm] = orders_mm
-                    .map(|sigma_mm| sigma_mm * focal_mm / LENS_MM);
+                let [third_mm, fifth_mm, seventh_mm] =
+                    orders_mm.map(|sigma_mm| sigma_mm * focal_mm / LENS_MM);
                 // The focal length scales the others, so it is put in first.
                 all.extend(LENS);
                 all.push(parameter("lens_third_order", "mm", third_mm, |head, v| {

@@ -19,7 +19,7 @@ pub enum FieldAction {
 #[command(after_help = "\
 Examples:
   ftheta field map --machine S14-f420 --points places.csv --out angles.csv
-  ftheta field map --machine S14-f420 --table table.txt --points angles.csv --out places.csv --inverse
+  ftheta field map --machine S14-f420 --table table.txt --inverse --points a.csv --out b.csv
 
 Places are columns x_mm,y_mm[,z_mm]; angles are columns angle_x_deg,angle_y_deg, mechanical.")]
 pub struct FieldMap {

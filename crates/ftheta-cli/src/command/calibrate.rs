@@ -57,10 +57,8 @@ fn run_field(arguments: &CalibrateField, as_json: bool) -> Result<(), Error> {
     tables::write(&field.table, &machine, &arguments.out, CorVersion::Two)?;
     let report = arguments.out.with_file_name("calibration.html");
     write_file(&report, field.report(&machine.name).as_bytes())?;
-    let files = [
-        ("table", arguments.out.display().to_string()),
-        ("report", report.display().to_string()),
-    ];
+    let files =
+        [("table", arguments.out.display().to_string()), ("report", report.display().to_string())];
     match as_json {
         true => json::print(&object(&field, &machine, &warnings, &files)),
         false => print(&field, &warnings, &files),
@@ -198,7 +196,8 @@ fn run_measure(arguments: &TwinMeasure, as_json: bool) -> Result<(), Error> {
     let path = &arguments.pattern;
     let pattern = import::pattern(path)?;
     let built_as = arguments.built_as.as_deref().map(machines::find).transpose()?;
-    let table = arguments.table.as_deref().map(|path| tables::usable(path, &machine)).transpose()?;
+    let table =
+        arguments.table.as_deref().map(|path| tables::usable(path, &machine)).transpose()?;
     let options = MeasureOptions {
         true_optics: built_as.as_ref().unwrap_or(&machine).optics.clone(),
         seed: arguments.seed,

@@ -32,7 +32,7 @@ pub fn before_and_after(out: &mut String, input: &CalibrationReportInput<'_>) {
                 format_args!(
                     "<p class=note>Arrows lead from where a mark should be to where it is, {} \
                      times as long as the error. Outliers are ringed, with their line of the \
-                     file.</p>{picture}",
+                     file; their arrows may be cut short.</p>{picture}",
                     number(scale)
                 ),
             ),

@@ -79,8 +79,8 @@ fn expected(map: &ErrorMap<'_>, top_um: f64) -> Option<String> {
     if !is_square || !half_mm.is_finite() || half_mm <= 0.0 {
         return None;
     }
-    let mut frame = FieldFrame::new(Rect::new(-half_mm, -half_mm, half_mm, half_mm));
     let cell_mm = 2.0 * half_mm / n_side as f64;
+    let mut frame = FieldFrame::new(Rect::new(-half_mm, -half_mm, half_mm, half_mm));
     let side_px = cell_mm * frame.px_per_mm;
     let mut classes = vec![String::new(); ERROR_COLORS.len()];
     for (index, &error_um) in map.errors_um.iter().enumerate() {

@@ -17,7 +17,7 @@ pub const N_SIDE_MAX: u32 = 65;
 /// Part of the pitch that a mark may take.
 const SIZE_MAX: f64 = 0.6;
 /// What a mark takes if not told: part of the pitch, and at most this many mm.
-const CROSS: (f64, f64) = (0.4, 8.0);
+const CROSS: (f64, f64) = (0.3, 8.0);
 const DOT: (f64, f64) = (0.15, 2.0);
 /// Smallest mark and smallest letter, in spot diameters.
 const SIZE_MIN_SPOTS: f64 = 4.0;
@@ -109,7 +109,11 @@ fn sizes(options: &GridOptions, machine: &Machine) -> Result<Sizes, PatternError
         return Err(PatternError::Field { field_mm, size_mm, reach_mm, limit_mm });
     }
     let gap_mm = match options.style {
-        MarkStyle::Cross => (0.25 * size_mm).max(3.0 * spot_mm),
+        // Beyond the tips where there is room, else clear of the arms.
+        MarkStyle::Cross => (0.5 * size_mm + 3.0 * spot_mm)
+            .min(0.1 * pitch_mm)
+            .max(0.25 * size_mm)
+            .max(3.0 * spot_mm),
         MarkStyle::Dot => 0.5 * size_mm + 3.0 * spot_mm,
     };
     let letter_mm = letter_mm(n_side, pitch_mm, gap_mm).min(0.25 * pitch_mm).min(4.0);
@@ -129,9 +133,9 @@ fn letter_mm(n_side: u32, pitch_mm: f64, gap_mm: f64) -> f64 {
     // In the cell beside the centre the axes' sign, two capitals long, stands beside a label.
     let one = (pitch_mm - 2.0 * gap_mm) / (widest_em(0..n_side) + 2.0 * CAPITAL_EM);
     // In the left border's cells two labels are side by side, in the lower border's one above the
-    // other.
-    let two_wide = (pitch_mm - 3.0 * gap_mm) / (2.0 * widest_em(0..2));
-    let two_high = (pitch_mm - 3.0 * gap_mm) / (2.0 * CAPITAL_EM);
+    // other, and a letter would fit between them.
+    let two_wide = (pitch_mm - 2.0 * gap_mm) / (2.0 * widest_em(0..2) + 1.0);
+    let two_high = (pitch_mm - 2.0 * gap_mm) / (2.0 * CAPITAL_EM + 1.0);
     one.min(two_wide).min(two_high)
 }
 

@@ -1,7 +1,7 @@
 //! A pattern as files: drawing, recipe, nominal places, and a table to fill in.
 
 use crate::output::Output;
-use crate::{Error, convert};
+use crate::{Error, convert, import};
 use ftheta_formats::text::hershey;
 use ftheta_formats::{pattern_file, svg_write};
 use ftheta_model::job::{Job, Layer, Paint, Shape};
@@ -73,16 +73,22 @@ impl Sheet {
     /// and path of each.
     ///
     /// # Errors
-    /// If a file cannot be written, or `out` does not end in `.svg`.
+    /// If a file cannot be written, `out` does not end in `.svg`, or the table beside it has been
+    /// filled in by a user.
     pub fn write(&self, out: &Path) -> Result<Vec<(&'static str, String)>, Error> {
         convert::check_svg(out)?;
+        let table = out.with_extension("csv");
+        // An hour's work with a ruler must not be lost to a command that is run again.
+        if table.is_file() && import::measured_points(&table, None).is_ok() {
+            return Err(Error::Filled { path: table });
+        }
         let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
         let mut output = Output::new(folder.unwrap_or(Path::new(".")))?;
         let files = [
             ("drawing", out.to_path_buf(), svg_write::to_svg(&self.job)),
             ("recipe", out.with_extension("recipe.toml"), self.recipe()),
             ("features", out.with_extension("json"), pattern_file::write(&self.pattern)),
-            ("points", out.with_extension("csv"), self.table()),
+            ("points", table, self.table()),
         ];
         for (_, path, content) in &files {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -95,11 +101,13 @@ impl Sheet {
     /// The recipe file that `ftheta mark` finds beside the drawing.
     fn recipe(&self) -> String {
         let pen = self.job.pens.first().cloned().unwrap_or_default();
+        // Tenths of a micrometre are fine enough, and short to read.
+        let spacing_mm = (self.hatch_spacing_mm * 1e4).round() * 1e-4;
         format!(
             "# How the pattern is marked. Dots are filled with lines this far apart.\n\
              [[pen]]\nname = \"pattern\"\ncolor = \"{COLOR}\"\nmark_speed_mm_s = {}\n\
-             power_w = {}\nhatch_spacing_mm = {}\n",
-            pen.mark_speed_mm_s, pen.power_w, self.hatch_spacing_mm
+             power_w = {}\nhatch_spacing_mm = {spacing_mm:.4}\n",
+            pen.mark_speed_mm_s, pen.power_w
         )
     }
 
