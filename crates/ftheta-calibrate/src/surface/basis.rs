@@ -124,9 +124,10 @@ fn chebyshev(u: f64, degree: usize) -> Vec<f64> {
     t
 }
 
-/// Uniform cubic B-splines: four of them are not zero in each zone.
+/// Uniform cubic B-splines: four of them are not zero in each zone. The zones span all that is not
+/// held, so that their stiffness holds beyond the square as well.
 fn splines(u: f64, n_zones: usize) -> Vec<f64> {
-    let position = 0.5 * (u + 1.0) * n_zones as f64;
+    let position = 0.5 * (u / BEYOND + 1.0) * n_zones as f64;
     let zone = (position.max(0.0) as usize).min(n_zones - 1);
     let s = position - zone as f64;
     let r = 1.0 - s;
