@@ -10,6 +10,7 @@ const LAYERS: [(&str, &[&str]); 9] = [
     ("ftheta-formats", &["ftheta-model", "ftheta-physics"]),
     ("ftheta-toolpath", &["ftheta-model", "ftheta-physics"]),
     ("ftheta-planner", &["ftheta-model", "ftheta-physics"]),
+    ("ftheta-calibrate", &["ftheta-model", "ftheta-physics"]),
     ("ftheta-twin", &["ftheta-model", "ftheta-physics"]),
     ("ftheta-report", &["ftheta-model", "ftheta-physics"]),
     (
@@ -20,6 +21,7 @@ const LAYERS: [(&str, &[&str]); 9] = [
             "ftheta-formats",
             "ftheta-toolpath",
             "ftheta-planner",
+            "ftheta-calibrate",
             "ftheta-twin",
             "ftheta-report",
         ],

@@ -216,7 +216,7 @@ fn choose(
     let physical_mm = rms(&mut used.map(|(left, _)| left.norm()));
     if clean.len() >= N_PREFERRED {
         let polynomial = surface(Family::Polynomial)?;
-        let polynomial_mm = rms(&mut polynomial.left_out_mm.iter().map(|left| left.norm()));
+        let polynomial_mm = rms(&mut polynomial.left_out_mm.iter().map(Vector2::norm));
         if polynomial_mm < PREFERRED * physical_mm {
             let why = format!(
                 "a {} predicts left-out marks to {:.1} µm, the physical model to {:.1} µm: the \
@@ -292,7 +292,8 @@ impl Calibration {
         self.physical.head()
     }
 
-    /// Errors of the physical model to expect with a grid of more marks over the same square, mm rms.
+    /// Errors to expect of the physical model with a grid of more marks over the same square, mm
+    /// rms.
     ///
     /// * `n_side`: marks along each side of the grid
     pub fn forecast_mm(&self, n_side: usize) -> Option<f64> {

@@ -57,7 +57,7 @@ impl Calibration {
         Ok(CorrectionTable::new(about, vec![plane], Drift::NONE)?)
     }
 
-    /// Corrected from nominal angles; beyond what the optics reach, the correction of a nearer place.
+    /// Corrected from nominal angles; beyond what the optics reach, as a nearer place is.
     fn corrected(&self, machine: &Machine, nominal: [f64; 2]) -> Option<[f64; 2]> {
         let mut near = nominal;
         for _ in 0..N_SHRINKS {

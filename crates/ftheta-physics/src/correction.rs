@@ -275,8 +275,8 @@ impl CorrectionTable {
         Err(CorrectionError::Machine { table, table_id, machine: machine.to_owned(), id })
     }
 
-    /// Checks that nothing in the field leaves the mirrors' limits through the table. Where the beam
-    /// is dark and beyond the field, words are held at the last one.
+    /// Checks that nothing in the field leaves the mirrors' limits through the table. Where the
+    /// beam is dark and beyond the field, words are held at the last one.
     ///
     /// # Errors
     /// If somewhere an angle or a speed would leave its limit.

@@ -13,9 +13,10 @@ fn main() {
     let n_heads: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(20);
     let row = |name: &str, setup: Setup, asked: &str| {
         let results: Vec<_> = (1000..1000 + n_heads).map(|seed| setup.errors_um(seed)).collect();
-        let mean = |value: &dyn Fn(&(ftheta::calibrate::calibrate::Calibration, f64, f64)) -> f64| {
-            results.iter().map(value).sum::<f64>() / n_heads as f64
-        };
+        let mean =
+            |value: &dyn Fn(&(ftheta::calibrate::calibrate::Calibration, f64, f64)) -> f64| {
+                results.iter().map(value).sum::<f64>() / n_heads as f64
+            };
         let outliers: usize = results.iter().map(|r| r.0.outliers.len()).sum();
         println!(
             "{name:44} {:7.1} / {:7.1}   expected {:6.1} / {:6.1}   noise {:5.1}   left out {:6.1}   wrong {outliers}   asked {asked}",
@@ -47,11 +48,24 @@ fn main() {
             row(&format!("{} marks, {noise} µm, {lens}", n * n), setup, asked);
         }
     }
-    row("25 marks, 10 µm, 120 mm", Setup { field_mm: 120.0, ..Setup::new(5, 10.0, false) }, "8 / 19");
+    row(
+        "25 marks, 10 µm, 120 mm",
+        Setup { field_mm: 120.0, ..Setup::new(5, 10.0, false) },
+        "8 / 19",
+    );
     row("289 marks, 10 µm, stress", Setup { stress: 5.0, ..Setup::new(17, 10.0, false) }, "7 / 20");
+    for field_mm in [120.0, 150.0, 200.0, 250.0, 280.0] {
+        for model in [Model::Scale, Model::NinePoint, Model::Physical] {
+            let setup = Setup { field_mm, model: Some(model), ..Setup::new(3, 50.0, false) };
+            let asked = if field_mm <= 200.0 { "thesis 500, 100" } else { "thesis 1000, 300" };
+            row(&format!("{field_mm} mm, 9 marks, 50 µm, {}", model.name()), setup, asked);
+        }
+    }
     for model in Model::ALL {
         for n in [3, 5, 9, 17] {
-            if n * n < model.n_marks_min() { continue; }
+            if n * n < model.n_marks_min() {
+                continue;
+            }
             let setup = Setup { model: Some(model), ..Setup::new(n, 10.0, false) };
             row(&format!("{}, {} marks, focal length", model.name(), n * n), setup, "");
         }

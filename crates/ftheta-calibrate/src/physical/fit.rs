@@ -202,8 +202,8 @@ impl Physical {
         Some((square / places.len() as f64).sqrt())
     }
 
-    /// Errors that are left at commands: standard deviation of the distance at each, and the mean of
-    /// the greatest one over fields drawn from what the marks leave open, mm.
+    /// Errors that are left at commands: standard deviation of the distance at each, and the mean
+    /// of the greatest one over fields drawn from what the marks leave open, mm.
     pub fn expected_mm(&self, commands: &[MirrorAngles]) -> (Vec<f64>, f64) {
         let turned: Vec<_> = commands.iter().map(|&c| self.model.axes.commands(c)).collect();
         let jacobian = self.model.jacobian(&turned, &self.estimate);

@@ -32,8 +32,8 @@ impl Basis {
         }
     }
 
-    /// The functions at a place. They go on a little beyond the square, since a target in its corner
-    /// may need commands beyond; farther out they stay as they are there, or they would run away.
+    /// The functions at a place. They go on a little beyond the square, since a target in its
+    /// corner may need commands beyond; farther out they stay as they are, or they would run away.
     ///
     /// * `index`: 0 for the error of x, 1 for that of y
     pub fn terms(self, [u, v]: [f64; 2], index: usize) -> Vec<f64> {

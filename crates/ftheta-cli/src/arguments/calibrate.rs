@@ -27,8 +27,8 @@ Examples:
   ftheta calibrate field --machine S14-f420 --points grid.csv --out table.txt
   ftheta calibrate field --machine S14-f420 --points grid.csv --model polynomial --out table.cor
 
-The points are target_x_mm,target_y_mm,measured_x_mm,measured_y_mm[,round]. calibration.html, written
-beside the table, shows what was found and what to do next.")]
+The points are target_x_mm,target_y_mm,measured_x_mm,measured_y_mm[,round]. calibration.html,
+written beside the table, shows what was found and what to do next.")]
 pub struct CalibrateField {
     /// Preset (see `ftheta machine list`) or machine file.
     #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
@@ -63,7 +63,8 @@ pub struct CalibrateField {
 
 #[derive(Args)]
 #[command(after_help = "\
-Example: ftheta calibrate drift --machine S14-f420 --table table.txt --points four.csv --out table-2.txt
+Example:
+  ftheta calibrate drift --machine S14-f420 --table table.txt --points four.csv --out new.txt
 
 The marks are made through the table; four near the field's corners do.")]
 pub struct CalibrateDrift {
