@@ -12,7 +12,7 @@ cargo xtask COMMAND
   ci       everything that CI runs: format, clippy, tidy, licences, docs, test
   test     all tests, the examples and the main job
   tidy     layers, sizes, descriptions, words
-  figures  the benches, printed as a table, and a million transitions";
+  figures  the benches, printed as a table, calibrations, and a million transitions";
 
 fn main() -> ExitCode {
     let command = std::env::args().nth(1).unwrap_or_default();
@@ -44,6 +44,8 @@ fn ci() -> Result<(), String> {
 
 fn figures() -> Result<(), String> {
     cargo(&["bench", "--workspace"])?;
+    let heads = ["--example", "04_calibration_figures", "20"];
+    cargo(&[&["run", "--release", "--package", "ftheta"], &heads[..]].concat())?;
     cargo(&["run", "--release", "--package", "ftheta-planner", "--example", "transitions"])
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What each crate may see of the others, dev-dependencies included.
-const LAYERS: [(&str, &[&str]); 9] = [
+const LAYERS: [(&str, &[&str]); 10] = [
     ("ftheta-model", &[]),
     ("ftheta-physics", &["ftheta-model"]),
     ("ftheta-formats", &["ftheta-model", "ftheta-physics"]),

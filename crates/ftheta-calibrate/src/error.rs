@@ -81,6 +81,18 @@ pub enum CalibrateError {
         /// Marks used.
         n_marks: usize,
     },
+    /// A target that nominal optics or the table marked through do not reach.
+    #[error(
+        "line {line}: the machine does not reach the target ({x_mm}, {y_mm}) mm; is it the right machine?"
+    )]
+    Target {
+        /// Line of the file.
+        line: u32,
+        /// The target, mm.
+        x_mm: f64,
+        /// The target, mm.
+        y_mm: f64,
+    },
     /// The model has no angles for a place of the table.
     #[error(
         "the calibrated head reaches no place near x {x_mm:.1} mm, y {y_mm:.1} mm, so no table can \

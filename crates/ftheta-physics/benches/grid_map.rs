@@ -39,7 +39,12 @@ fn places(scattered: bool) -> Vec<[f64; 2]> {
         .collect()
 }
 
-fn look_up(bencher: Bencher<'_, '_>, interpolation: Interpolation, n_nodes: usize, scattered: bool) {
+fn look_up(
+    bencher: Bencher<'_, '_>,
+    interpolation: Interpolation,
+    n_nodes: usize,
+    scattered: bool,
+) {
     let (map, places) = (map(interpolation, n_nodes), places(scattered));
     let mut values = vec![[0.0; 2]; N_PLACES];
     bencher

@@ -194,7 +194,8 @@ fn command(
     point: &MeasuredPoint,
 ) -> Result<MirrorAngles, Error> {
     let FieldPoint { x_mm, y_mm } = point.target_mm;
-    let unreached = || CalibrateError::Unreachable { x_mm, y_mm };
+    let line = point.line;
+    let unreached = || CalibrateError::Target { line, x_mm, y_mm };
     let nominal = || angles_from_field(&machine.optics, point.target_mm).ok_or_else(unreached);
     match through {
         MarkedThrough::Nominal => Ok(nominal()?),
@@ -227,7 +228,7 @@ fn advice(calibration: &Calibration, marks: &[Mark]) -> Vec<String> {
                 .into(),
         );
     }
-    if calibration.model != Model::Physical && marks.len() >= Model::Physical.n_marks_min() {
+    if calibration.model != Model::Physical && marks.len() >= 9 {
         advice
             .push("Leave out --model: the physical model is the better one for most heads".into());
     }

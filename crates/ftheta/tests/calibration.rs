@@ -175,7 +175,7 @@ fn rounds_add_up_and_drift_is_followed() {
 }
 
 /// The thesis' own test: a square with a cross, nine marks measured to 50 µm. It printed 0.5 mm to
-/// 200 mm and 1 mm beyond by parameters, 0.1 and 0.3 mm with nine points; noise alone puts the worst
+/// 200 mm and 1 mm beyond by parameters, 0.1 and 0.3 mm with nine points; noise puts the worst
 /// of nine marks 0.12 mm off.
 #[test]
 fn the_thesis_test_is_replayed() {

@@ -25,6 +25,12 @@ const N_SUSPECTS: usize = 8;
 const LOG_WRONG: f64 = -9.9;
 /// At most this share of the marks may be taken for wrong.
 const WRONG_SHARE: f64 = 0.25;
+/// How much likelier right than wrong a dropped mark has to be, as a logarithm, to be taken back.
+const TAKEN_BACK: f64 = 1.0;
+/// Up to so many marks there is a second search for wrong ones.
+const N_SECOND_LOOK: usize = 1000;
+/// Rounds in which the marks that agree best are chosen anew.
+const N_CONCENTRATIONS: usize = 6;
 /// Fields drawn from the posterior for the expected maximum.
 const N_DRAWS: usize = 40;
 
@@ -49,33 +55,109 @@ pub struct Physical {
 }
 
 /// Fits the physics of a head; `None` where the equations break down.
+///
+/// Several wrong marks may hide each other from a search that drops one after the other, so there
+/// is a second one that begins with the marks that agree best. The likelier outcome counts.
 pub fn fit(optics: &Optics, axes: Axes, marks: &[Mark], noise: Noise) -> Option<Physical> {
     let residual = Residual::over(marks.iter().map(|mark| mark.command));
     let model = Model { parameters: Parameters::new(optics), axes, residual };
-    let mut used = vec![true; marks.len()];
+    let start = vec![true; marks.len()];
+    let mut settled = settle(&model, marks, noise, start)?;
+    if marks.len() <= N_SECOND_LOOK {
+        let start = agreeing(&model, marks, noise, &settled.estimate)?;
+        let second = settle(&model, marks, noise, start);
+        settled = second.filter(|s| s.log_likely > settled.log_likely).unwrap_or(settled);
+    }
+    let Settled { estimate, used, posterior, equations, sums, .. } = settled;
+    let left_out_mm = left_out(&equations, &posterior, &used, &model.axes);
+    let tracer = Tracer::new(&model.parameters.head(head_values(&model, &estimate)));
+    Some(Physical { model, posterior, tracer, estimate, sums, used, left_out_mm })
+}
+
+/// A fit that has settled.
+struct Settled {
+    estimate: DVector<f64>,
+    used: Vec<bool>,
+    posterior: Posterior,
+    equations: Linearised,
+    sums: Sums,
+    /// Logarithm of how likely marks and wrong marks are.
+    log_likely: f64,
+}
+
+/// Fits the marks used, and drops or takes back marks until none should be.
+fn settle(model: &Model, marks: &[Mark], noise: Noise, start: Vec<bool>) -> Option<Settled> {
+    let mut used = start;
     let mut estimate = DVector::zeros(model.n_unknowns());
-    let mut settled = None;
-    for _ in 0..N_ROUNDS_MAX {
+    let mut settled: Option<(Posterior, Linearised, Sums)> = None;
+    let mut n_changes = 0;
+    for _ in 0..N_ROUNDS_MAX + 2 * marks.len().min(N_SECOND_LOOK) {
         let equations = model.linearised(marks, &estimate);
         let sums = Sums::new(&equations, &used, model.n_parameters());
-        let posterior = sums.best(noise.sigma_mm)?;
+        let posterior = match &settled {
+            None => sums.best(noise.sigma_mm)?,
+            Some((before, ..)) => sums.best_near(before.scales, noise.sigma_mm, true)?,
+        };
         let step = (&posterior.estimate - &estimate).amax();
         estimate.copy_from(&posterior.estimate);
-        let still = step < SETTLED;
-        let wrong =
-            (step < 1.0).then(|| wrong_mark(&equations, &sums, &posterior, &used, noise)).flatten();
-        if let Some(mark) = wrong {
-            used[mark] = false;
+        let mut changes = Vec::new();
+        // Dropping and taking back in turn could go on for ever.
+        if step < 1.0 && n_changes < 2 * marks.len() {
+            changes = right_marks(&equations, &posterior, &used);
+            if changes.is_empty() {
+                changes.extend(wrong_mark(&equations, &sums, &posterior, &used, noise));
+            }
         }
+        changes.iter().for_each(|&mark| used[mark] = !used[mark]);
+        n_changes += changes.len();
         settled = Some((posterior, equations, sums));
-        if still && wrong.is_none() {
+        if step < SETTLED && changes.is_empty() {
             break;
         }
     }
     let (posterior, equations, sums) = settled?;
-    let left_out_mm = left_out(&equations, &posterior, &used, &model.axes);
-    let tracer = Tracer::new(&model.parameters.head(head_values(&model, &estimate)));
-    Some(Physical { model, posterior, tracer, estimate, sums, used, left_out_mm })
+    let n_wrong = used.iter().filter(|&&used| !used).count() as f64;
+    let log_likely = posterior.log_evidence + n_wrong * LOG_WRONG;
+    Some(Settled { estimate, used, posterior, equations, sums, log_likely })
+}
+
+/// The marks that agree best with each other: all but the share that may be wrong.
+fn agreeing(
+    model: &Model,
+    marks: &[Mark],
+    noise: Noise,
+    first: &DVector<f64>,
+) -> Option<Vec<bool>> {
+    let n_kept = marks.len() - (WRONG_SHARE * marks.len() as f64) as usize;
+    let mut estimate = first.clone();
+    let mut kept = vec![true; marks.len()];
+    for _ in 0..N_CONCENTRATIONS {
+        let equations = model.linearised(marks, &estimate);
+        let residuals = &equations.data_mm - &equations.jacobian * &estimate;
+        let size = |mark: usize| residuals[2 * mark].hypot(residuals[2 * mark + 1]);
+        let mut order: Vec<usize> = (0..marks.len()).collect();
+        order.sort_by(|&a, &b| size(a).total_cmp(&size(b)));
+        kept.fill(false);
+        order[..n_kept].iter().for_each(|&mark| kept[mark] = true);
+        let sums = Sums::new(&equations, &kept, model.n_parameters());
+        estimate = sums.best(noise.sigma_mm)?.estimate;
+    }
+    Some(kept)
+}
+
+/// The dropped marks that are likelier right than wrong.
+fn right_marks(equations: &Linearised, posterior: &Posterior, used: &[bool]) -> Vec<usize> {
+    let noise_square = posterior.scales.noise_mm.powi(2);
+    let is_right = |&mark: &usize| {
+        let (left, covariance) = innovation(equations, posterior, mark);
+        let covariance = covariance + Matrix2::identity() * noise_square;
+        let Some(inverse) = covariance.try_inverse() else {
+            return false;
+        };
+        let area = 2.0 * std::f64::consts::PI * covariance.determinant().sqrt();
+        -0.5 * left.dot(&(inverse * left)) - area.ln() > LOG_WRONG + TAKEN_BACK
+    };
+    (0..used.len()).filter(|&mark| !used[mark]).filter(is_right).collect()
 }
 
 fn head_values<'a>(model: &Model, estimate: &'a DVector<f64>) -> &'a [f64] {
@@ -127,7 +209,7 @@ fn wrong_mark(
     suspects.truncate(N_SUSPECTS);
     let gains = suspects.iter().filter_map(|&(_, mark)| {
         let without = sums.without(equations, mark);
-        let without = without.best_noise(posterior.scales.residual_mm, noise.sigma_mm)?;
+        let without = without.best_near(posterior.scales, noise.sigma_mm, false)?;
         Some((without.log_evidence + LOG_WRONG - posterior.log_evidence, mark))
     });
     gains.filter(|(gain, _)| *gain > 0.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mark)| mark)

@@ -1,4 +1,5 @@
 //! Heads with hidden errors, marks measured on them, and what a calibration leaves.
+#![allow(dead_code, reason = "tests, bench and example each use a part")]
 
 use ftheta::calibrate::calibrate::{CalibrateOptions, Calibration, Model, Noise, calibrate};
 use ftheta::calibrate::mark::Mark;
