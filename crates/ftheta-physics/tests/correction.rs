@@ -16,7 +16,7 @@ const BOTH: [Interpolation; 2] = [Interpolation::Bilinear, Interpolation::Catmul
 
 fn optics() -> Optics {
     let lens = Lens::FTheta { coefficients_mm: F420.to_vec() };
-    Optics { lens, first_mirror: Axis::X, field_mm: 336.0 }
+    Optics { lens, first_mirror: Axis::X, field_mm: 336.0, aperture_mm: None, focus: None }
 }
 
 /// Place to command of the f = 420 mm lens, in mm of the linear command, as in the reference.
@@ -108,7 +108,9 @@ fn tables_that_fold_or_need_too_much_are_refused() {
     assert!(refusal(table(|x, y| [4.0 * x, y])).starts_with("Value"));
     assert!(refusal(table(|_, _| [f64::NAN; 2])).starts_with("Value"));
 
-    let limits = |angles: fn(f64, f64) -> [f64; 2]| table(angles).unwrap().check_limits(&scanner(), &optics());
+    let limits = |angles: fn(f64, f64) -> [f64; 2]| {
+        table(angles).unwrap().check_limits(&scanner(), &optics())
+    };
     limits(bent).unwrap();
     limits(|x, y| [-y, x]).unwrap();
     let error = limits(|x, y| [x + 0.004 * (8.0 * x).sin(), y]).unwrap_err().to_string();
