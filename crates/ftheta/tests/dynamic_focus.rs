@@ -1,5 +1,5 @@
 //! A head whose focus is moved by a lens: marks, waits, and what the audit says of them.
-#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
 use ftheta::Error;
 use ftheta::atlas_store::AtlasStore;
@@ -89,7 +89,7 @@ fn the_audit_refuses_what_the_lens_cannot_do() {
     let plan = &*PLAN;
     let says = |change: &dyn Fn(&mut Focus), what: &str| {
         let error = refusal(plan, change);
-        let AuditError::Limit { quantity, .. } = &error else { return assert!(false, "{error}") };
+        let AuditError::Limit { quantity, .. } = &error else { panic!("{error}") };
         assert!(quantity.contains(what), "{error}");
     };
     says(&|focus| focus.speed_max_mm_s *= 0.7, "the focusing lens");

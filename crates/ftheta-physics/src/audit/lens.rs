@@ -78,7 +78,8 @@ impl<'a> LensWalk<'a> {
             return Ok(());
         };
         let time_s = n_ticks as f64 * self.tick_s;
-        self.check_dark(focus, Moving { time_s, at_mm, speed_mm_s: 0.0 }, "end of the plan")
+        let end = Moving { time_s, at_mm, speed_mm_s: 0.0 };
+        check_dark(focus, self.travel_max_mm(focus), [self.left, end], "end of the plan")
     }
 
     /// First and last tick of the light of the mark at hand; two ticks or more.
@@ -122,7 +123,7 @@ impl<'a> LensWalk<'a> {
                 let limit = focus.acceleration_max_mm_s2;
                 within(&place, quantity, acceleration, limit, "mm/s²")?;
             } else {
-                self.check_dark(focus, now, &place())?;
+                check_dark(focus, travel_max_mm, [self.left, now], &place())?;
             }
             self.left = now;
         }
@@ -134,41 +135,48 @@ impl<'a> LensWalk<'a> {
     fn travel_max_mm(&self, focus: &Focus) -> f64 {
         focus.travel_mm + self.draft.tolerance_mm / focus.magnification.abs()
     }
+}
 
-    /// Checks that the lens gets from where it was left to `to` in the time between.
-    ///
-    /// What it reaches in that time lies between the two ways that speed up at once in either
-    /// direction. A way with one constant speed in its middle leaves its ends the least.
-    fn check_dark(&self, focus: &Focus, to: Moving, place: &str) -> Result<(), AuditError> {
-        let (from, a) = (self.left, focus.acceleration_max_mm_s2);
-        let place = || format!("{place}: the dark before it");
-        let time_s = to.time_s - from.time_s;
-        let change = to.speed_mm_s - from.speed_mm_s;
-        let quantity = "change of speed of the focusing lens";
-        within(&place, quantity, change, (a * time_s).max(0.0), "mm/s")?;
-        let way_mm = to.at_mm - from.at_mm;
-        let speeds = [from.speed_mm_s, to.speed_mm_s];
-        let most_mm = longest_mm(focus, speeds, time_s);
-        let least_mm = -longest_mm(focus, speeds.map(|speed| -speed), time_s);
-        let middle_mm = 0.5 * (most_mm + least_mm);
-        let quantity = "way of the focusing lens beside its mean reach";
-        within(&place, quantity, way_mm - middle_mm, most_mm - middle_mm, "mm")?;
-        let ramps_mm = speeds.map(|speed| 0.5 * speed * speed.abs() / a);
-        let can_stop = (speeds[0].abs() + speeds[1].abs()) / a <= time_s;
-        let cruise = match can_stop {
-            true => way_mm - ramps_mm[0] - ramps_mm[1],
-            false => speeds[0] + speeds[1],
-        };
-        let limit_mm = self.travel_max_mm(focus);
-        for (at_mm, speed) in
-            [(from.at_mm + ramps_mm[0], speeds[0]), (to.at_mm - ramps_mm[1], speeds[1])]
-        {
-            if speed * cruise < 0.0 {
-                within(&place, "travel of the focusing lens", at_mm, limit_mm, "mm")?;
-            }
+/// Checks that the lens gets from one state to another in the time between.
+///
+/// What it reaches in that time lies between the two ways that speed up at once in either
+/// direction. A way with one constant speed in its middle leaves its ends the least.
+fn check_dark(
+    focus: &Focus,
+    travel_max_mm: f64,
+    [from, to]: [Moving; 2],
+    place: &str,
+) -> Result<(), AuditError> {
+    let a = focus.acceleration_max_mm_s2;
+    let place = || format!("{place}: the dark before it");
+    let time_s = to.time_s - from.time_s;
+    // Negative where light comes before the lens can be told of it.
+    within(&place, "time that the focusing lens lacks", (-time_s).max(0.0), 0.0, "s")?;
+    let change = to.speed_mm_s - from.speed_mm_s;
+    let quantity = "change of speed of the focusing lens";
+    within(&place, quantity, change, (a * time_s).max(0.0), "mm/s")?;
+    let way_mm = to.at_mm - from.at_mm;
+    let speeds = [from.speed_mm_s, to.speed_mm_s];
+    let most_mm = longest_mm(focus, speeds, time_s);
+    let least_mm = -longest_mm(focus, speeds.map(|speed| -speed), time_s);
+    let middle_mm = 0.5 * (most_mm + least_mm);
+    let quantity = "way of the focusing lens beside its mean reach";
+    within(&place, quantity, way_mm - middle_mm, most_mm - middle_mm, "mm")?;
+    let ramps_mm = speeds.map(|speed| 0.5 * speed * speed.abs() / a);
+    let can_stop = (speeds[0].abs() + speeds[1].abs()) / a <= time_s;
+    let cruise = match can_stop {
+        true => way_mm - ramps_mm[0] - ramps_mm[1],
+        false => speeds[0] + speeds[1],
+    };
+    for (at_mm, speed) in
+        [(from.at_mm + ramps_mm[0], speeds[0]), (to.at_mm - ramps_mm[1], speeds[1])]
+    {
+        // A lens that does not go on in the direction of this end stops beside it.
+        if speed != 0.0 && speed.signum() * cruise <= ROUNDING {
+            within(&place, "travel of the focusing lens", at_mm, travel_max_mm, "mm")?;
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// Longest way in a time between speeds, mm.
@@ -193,4 +201,72 @@ fn within(
     }
     let (value, limit) = (six_digits(value), six_digits(limit));
     Err(AuditError::Limit { place: place(), quantity, value, limit, unit })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+    use super::{Moving, check_dark};
+    use ftheta_model::machine::Focus;
+    use proptest::prelude::*;
+
+    const FOCUS: Focus = Focus {
+        magnification: 4.0,
+        travel_mm: 5.0,
+        speed_max_mm_s: 280.0,
+        acceleration_max_mm_s2: 2e5,
+        lag_s: 0.0,
+        balanced: true,
+    };
+
+    fn allows(from: [f64; 2], to: [f64; 2], time_s: f64) -> bool {
+        let moving = |time_s, [at_mm, speed_mm_s]: [f64; 2]| Moving { time_s, at_mm, speed_mm_s };
+        let ends = [moving(0.0, from), moving(time_s, to)];
+        check_dark(&FOCUS, FOCUS.travel_mm, ends, "here").is_ok()
+    }
+
+    #[test]
+    fn the_shortest_times_are_those_of_a_trapezoid() {
+        // 0.1 mm without coasting: 2·√(d/a); 9 mm with it: d/v + v/a; both from rest to rest.
+        for (way_mm, time_s) in [(0.1, 2.0 * (0.1_f64 / 2e5).sqrt()), (9.0, 9.0 / 280.0 + 1.4e-3)] {
+            let from = [-0.5 * way_mm, 0.0];
+            let to = [0.5 * way_mm, 0.0];
+            assert!(allows(from, to, time_s) && !allows(from, to, 0.999 * time_s), "{way_mm}");
+        }
+        // At full speed over 2.8 mm: 10 ms; a little later there is no way without a turn, and a
+        // turn takes room that there is not before the end of the range.
+        assert!(allows([-1.4, 280.0], [1.4, 280.0], 0.01));
+        assert!(!allows([-1.4, 280.0], [1.4, 280.0], 0.0099));
+        assert!(allows([4.85, 200.0], [4.85, -200.0], 0.002));
+        assert!(!allows([4.95, 200.0], [4.95, -200.0], 0.002));
+        assert!(!allows([0.0, 0.0], [0.0, 0.0], -0.001));
+        assert!(!allows([0.0, 0.0], [f64::NAN, 0.0], 1.0));
+    }
+
+    proptest! {
+        /// No way that keeps the limits is refused, however it winds.
+        #[test]
+        fn ways_within_limits_are_allowed(
+            start in (-4.0..4.0_f64, -280.0..280.0_f64),
+            pushes in prop::collection::vec((-1.3..1.3_f64, 1e-5..2e-3_f64), 1..12),
+        ) {
+            let from = [start.0, start.1];
+            let ([mut at_mm, mut speed], mut time_s) = (from, 0.0);
+            for (push, mut duration_s) in pushes {
+                let acceleration = FOCUS.acceleration_max_mm_s2 * push.clamp(-1.0, 1.0);
+                // As long as the speed allows.
+                let room = FOCUS.speed_max_mm_s - speed * acceleration.signum();
+                duration_s = duration_s.min(room / acceleration.abs());
+                let turn_s = -speed / acceleration;
+                let top_mm = at_mm - 0.5 * speed * speed / acceleration;
+                prop_assume!(!(0.0..duration_s).contains(&turn_s) || top_mm.abs() <= 5.0);
+                at_mm += duration_s * (speed + 0.5 * acceleration * duration_s);
+                speed += acceleration * duration_s;
+                time_s += duration_s;
+                prop_assume!(at_mm.abs() <= FOCUS.travel_mm);
+            }
+            prop_assert!(allows(from, [at_mm, speed], time_s), "{from:?} {at_mm} {speed} {time_s}");
+        }
+    }
 }
