@@ -5,9 +5,9 @@ mod write;
 
 use crate::toml_table::{Section, TomlError, parse};
 use ftheta_model::machine::{
-    Axis, Drive, Laser, Lens, Losses, Machine, Optics, Output, Scanner, Sensor, Servo,
+    Axis, Drive, Focus, Laser, Lens, Losses, Machine, Optics, Output, Scanner, Sensor, Servo,
 };
-use ftheta_physics::laser::spot_diameter_mm;
+use ftheta_physics::focus::{field_travel_mm, spot_diameter_mm};
 pub use preset::{PRESETS, preset, preset_text};
 use std::f64::consts::PI;
 pub use write::to_toml;
@@ -135,11 +135,41 @@ fn optics(section: &Section<'_>) -> Result<Optics, TomlError> {
         Lens::FTheta { coefficients_mm }
     };
     let axes = [("x", Axis::X), ("y", Axis::Y)];
-    Ok(Optics {
+    let mut optics = Optics {
         lens,
         first_mirror: section.choice("first_mirror", &axes)?.unwrap_or(Axis::X),
         field_mm: section.need("field_mm", 0.1..=1e4)?,
-    })
+        aperture_mm: section.number("aperture_mm", 0.1..=500.0)?,
+        focus: None,
+    };
+    optics.focus = section.section("focus", |inner| focus(inner, &optics))?;
+    if optics.focus.is_some() && matches!(optics.lens, Lens::FTheta { .. }) {
+        return Err(section.refuse("kind", "\"post-objective\", the only kind with [optics.focus]"));
+    }
+    Ok(optics)
+}
+
+fn focus(section: &Section<'_>, optics: &Optics) -> Result<Focus, TomlError> {
+    let focus = Focus {
+        magnification: section.need("magnification", -1e3..=1e3)?,
+        travel_mm: section.need("travel_mm", 1e-3..=1e3)?,
+        speed_max_mm_s: section.need("speed_max_mm_s", 1e-2..=1e6)?,
+        acceleration_max_mm_s2: section.need("acceleration_max_mm_s2", 1.0..=1e9)?,
+        lag_s: section.number("lag_us", 0.0..=1e5)?.unwrap_or(0.0) * 1e-6,
+        balanced: section.boolean("balanced")?.unwrap_or(true),
+    };
+    if focus.magnification.abs() < 1e-3 {
+        return Err(section.refuse("magnification", "0.001 to 1000, either sign"));
+    }
+    let needed_mm = field_travel_mm(optics, &focus);
+    if needed_mm > focus.travel_mm {
+        let limit = format!(
+            "what a field of {} mm needs at this magnification, {needed_mm:.3} mm or more",
+            optics.field_mm
+        );
+        return Err(section.refuse("travel_mm", limit));
+    }
+    Ok(focus)
 }
 
 fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {

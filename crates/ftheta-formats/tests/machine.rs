@@ -154,3 +154,57 @@ fn axes_that_cannot_be_steered_are_refused() {
         ]],
     );
 }
+
+const DYNAMIC_FOCUS: &str = include_str!("../../../gallery/dynamic-focus.toml");
+
+#[test]
+fn a_focusing_lens_survives_a_round_trip() {
+    let machine = machine::read("dynamic-focus.toml", DYNAMIC_FOCUS).unwrap();
+    let focus = machine.optics.focus.as_ref().unwrap();
+    assert_eq!((focus.magnification, focus.travel_mm, focus.balanced), (4.0, 5.0, true));
+    assert_eq!((focus.lag_s, machine.optics.aperture_mm), (7e-4, Some(14.0)));
+    let again = machine::read("dynamic-focus.toml", &machine::to_toml(&machine)).unwrap();
+    assert_eq!(machine, again);
+}
+
+#[test]
+fn faults_of_a_focusing_lens_name_line_value_and_limit() {
+    let check = |from: &str, to: &str, expected: Expect| {
+        assert!(DYNAMIC_FOCUS.contains(from), "{from}");
+        let text = DYNAMIC_FOCUS.replacen(from, to, 1);
+        expected.assert_eq(&machine::read("my.toml", &text).unwrap_err().to_string());
+    };
+    check(
+        "travel_mm = 5.0",
+        "travel_mm = 4.9",
+        expect![[
+            "my.toml:36: optics.focus.travel_mm = 4.9 is outside what a field of 280 mm needs at this magnification, 4.959 mm or more"
+        ]],
+    );
+    check(
+        "lag_us = 700.0",
+        "lag_us = 700.0\nbalanced = false",
+        expect![[
+            "my.toml:36: optics.focus.travel_mm = 5.0 is outside what a field of 280 mm needs at this magnification, 9.917 mm or more"
+        ]],
+    );
+    check(
+        "magnification = 4.0",
+        "magnification = 0.0",
+        expect![
+            "my.toml:35: optics.focus.magnification = 0.0 is outside 0.001 to 1000, either sign"
+        ],
+    );
+    check(
+        "speed_max_mm_s = 280.0\n",
+        "",
+        expect!["my.toml:34: optics.focus.speed_max_mm_s is missing"],
+    );
+    check(
+        "kind = \"post-objective\"\nmirror_distance_mm = 30.0\nworking_distance_mm = 460.0",
+        "kind = \"f-theta\"\ncoefficients_mm = [460.0]",
+        expect![[
+            "my.toml:26: optics.kind = \"f-theta\" is outside \"post-objective\", the only kind with [optics.focus]"
+        ]],
+    );
+}

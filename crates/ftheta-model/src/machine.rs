@@ -112,6 +112,30 @@ pub struct Optics {
     pub first_mirror: Axis,
     /// Side of the square field, mm.
     pub field_mm: f64,
+    /// Free diameter of the mirrors across the beam, mm; `None` where it is not known.
+    pub aperture_mm: Option<f64>,
+    /// The lens that keeps a post-objective head's focus in the work plane; `None` for a fixed
+    /// focus.
+    pub focus: Option<Focus>,
+}
+
+/// A lens in front of the mirrors that moves the focus, and its axis (dynamic focus).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Focus {
+    /// Shift of the focus away from the head by travel of the lens (longitudinal), either sign,
+    /// not zero.
+    pub magnification: f64,
+    /// Greatest travel of the lens from the middle of its range, mm, either side.
+    pub travel_mm: f64,
+    /// Greatest speed of the lens, mm/s.
+    pub speed_max_mm_s: f64,
+    /// Greatest acceleration of the lens, mm/s².
+    pub acceleration_max_mm_s2: f64,
+    /// Time by which the lens follows its command, s.
+    pub lag_s: f64,
+    /// Whether the middle of the range is half way between what the field's centre and its corners
+    /// need, and not at the centre.
+    pub balanced: bool,
 }
 
 /// How the beam is focused.

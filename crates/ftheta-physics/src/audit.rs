@@ -4,6 +4,7 @@
 //! sample through the exact optics and the nominal servo and motor, and looks at what comes out.
 
 mod beam;
+mod lens;
 mod light;
 mod structure;
 mod track;
@@ -18,6 +19,7 @@ use beam::Beam;
 use ftheta_model::machine::{Drive, Machine};
 use ftheta_model::plan::{Motion, PlanDraft};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
+use lens::LensWalk;
 use thiserror::Error;
 use walk::{Command, Walk};
 
@@ -184,6 +186,7 @@ pub fn audit(draft: &PlanDraft) -> Result<Audited, AuditError> {
     let mut walk = Walk::new(draft, gains, inverse.as_ref(), by_voltage);
     let mut meter = Meter::new(draft, gains);
     let mut beam = Beam::new(draft, by_voltage);
+    let mut lens = LensWalk::new(draft);
     let period_ns = f64::from(draft.machine.output.period_ns);
     let gap_max_rad = draft.tolerance_mm / scale_mm_per_rad(&draft.machine.optics);
     while let Some((command, segment_index)) = walk.next() {
@@ -197,7 +200,9 @@ pub fn audit(draft: &PlanDraft) -> Result<Audited, AuditError> {
         meter.sample(draft, command, segment_index)?;
         // The samples before this one have moved the mirrors to the end of its tick.
         beam.sample(meter.n_samples as f64 * period_ns, meter.angles())?;
+        lens.sample(meter.n_samples, meter.angles())?;
     }
+    lens.finish(meter.n_samples)?;
     Ok(Audited { limits: meter.limits, planned_error_mm: beam.worst_mm() })
 }
 

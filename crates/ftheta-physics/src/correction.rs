@@ -354,17 +354,24 @@ fn between(planes: &[CorrectionPlane], z_mm: f64) -> (usize, f64) {
     (below, ((z_mm - low_mm) / (high_mm - low_mm)).clamp(0.0, 1.0))
 }
 
-/// Sixteen hexadecimal digits that identify optics: their lens, first mirror and field.
+/// Sixteen hexadecimal digits that identify optics: their lens, first mirror, field, and
+/// where a focusing lens stands.
 pub fn optics_id(optics: &Optics) -> String {
     let mut hash = Sha256::new();
     let mut number = |value: f64| hash.update(value.to_bits().to_le_bytes());
     number(optics.field_mm);
     number(if optics.first_mirror == Axis::X { 0.0 } else { 1.0 });
     match &optics.lens {
-        Lens::FTheta { coefficients_mm } => coefficients_mm.iter().copied().for_each(number),
+        Lens::FTheta { coefficients_mm } => coefficients_mm.iter().copied().for_each(&mut number),
         Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
-            [-1.0, *mirror_distance_mm, *working_distance_mm].into_iter().for_each(number);
+            [-1.0, *mirror_distance_mm, *working_distance_mm].into_iter().for_each(&mut number);
         }
+    }
+    // Where the lens stands turns the beam a little; how fast it may move does not.
+    if let Some(focus) = &optics.focus {
+        [-2.0, focus.magnification, f64::from(u8::from(focus.balanced))]
+            .into_iter()
+            .for_each(number);
     }
     hash.finalize()[..8].iter().fold(String::new(), |mut text, byte| {
         write!(text, "{byte:02x}").expect("a string takes everything");

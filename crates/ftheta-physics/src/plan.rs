@@ -237,6 +237,20 @@ impl Feed {
                 self.number(*working_distance_mm);
             }
         }
+        // A head without such a lens keeps the ids that it had before there were any.
+        if let Some(focus) = &optics.focus {
+            self.text("focus");
+            [
+                focus.magnification,
+                focus.travel_mm,
+                focus.speed_max_mm_s,
+                focus.acceleration_max_mm_s2,
+                focus.lag_s,
+                f64::from(u8::from(focus.balanced)),
+            ]
+            .iter()
+            .for_each(|&value| self.number(value));
+        }
         match scanner.servo {
             Servo::StateFeedback { velocity_weight_s, lag_s } => {
                 self.number(velocity_weight_s);

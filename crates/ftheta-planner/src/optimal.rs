@@ -8,6 +8,7 @@ mod fly_by;
 mod glide;
 mod heat;
 mod join;
+mod lens;
 mod marking;
 mod path;
 mod pieces;
@@ -253,12 +254,18 @@ pub fn longest_step_rad(toolpath: &Toolpath, machine: &Machine) -> f64 {
     let angles = |place: Point| angles_from_field(&machine.optics, place.into());
     let mut at = angles(Point::ZERO);
     let mut longest_rad = 0.0_f64;
+    // Where mirrors wait for a focusing lens, they do so in the centre.
+    let waits = machine.optics.focus.is_some();
     for mark in &toolpath.marks {
-        if let (Some(from), Some(to)) = (at, angles(mark.start())) {
+        let start = angles(mark.start());
+        if let (Some(from), Some(to)) = (at, start) {
             let step_rad = (to.x_rad - from.x_rad).abs().max((to.y_rad - from.y_rad).abs());
             longest_rad = longest_rad.max(step_rad);
         }
         at = mark.points.last().and_then(|&end| angles(end));
+        for place in [start, at].into_iter().flatten().filter(|_| waits) {
+            longest_rad = longest_rad.max(place.x_rad.abs()).max(place.y_rad.abs());
+        }
     }
     // And back to the centre.
     let back_rad = at.map_or(0.0, |end| end.x_rad.abs().max(end.y_rad.abs()));

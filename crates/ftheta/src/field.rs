@@ -5,6 +5,7 @@ use ftheta_formats::points::{AnglesRow, Place, read_angles, read_places};
 use ftheta_model::machine::{Axis, Lens, Machine, Optics};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_physics::correction::CorrectionTable;
+use ftheta_physics::focus::travel_of_shift_mm;
 use ftheta_physics::optics::{angles_from_field, field_from_angles, path_difference_mm};
 use std::fmt::Write;
 use std::path::Path;
@@ -20,8 +21,9 @@ pub struct Mapped {
     pub place_mm: FieldPoint,
     /// Mechanical, as they are sent: corrected where there is a table.
     pub angles: MirrorAngles,
-    /// How much farther from the head the focus has to be than in the field's centre, mm; `None`
-    /// for a lens and places without a height.
+    /// Where the focusing lens has to stand, from the middle of its travel, mm; without one, how
+    /// much farther from the head the focus has to be than in the field's centre. `None` behind an
+    /// F-theta lens for places without a height.
     pub focus_mm: Option<f64>,
 }
 
@@ -62,6 +64,21 @@ pub enum Unmapped {
         /// Greatest angle, rad.
         limit_rad: f64,
     },
+    /// Beyond the focusing lens.
+    #[error(
+        "({}, {}) mm at a height of {z_mm} mm needs the focusing lens at {travel_mm:.4} mm, the \
+         limit is ±{limit_mm} mm", place_mm.x_mm, place_mm.y_mm
+    )]
+    Focus {
+        /// Where, mm.
+        place_mm: FieldPoint,
+        /// Height above the nominal work plane, mm.
+        z_mm: f64,
+        /// Travel of the lens, mm.
+        travel_mm: f64,
+        /// Greatest travel, mm.
+        limit_mm: f64,
+    },
     /// Angles of which optics or table know nothing.
     #[error(
         "angles ({:.4}°, {:.4}°) are beyond {limit}", angles.x_rad.to_degrees(),
@@ -85,6 +102,9 @@ impl FieldError {
             Unmapped::Angle { angle_rad, limit_rad, .. } => {
                 (degrees(angle_rad), format!("±{}", degrees(limit_rad)))
             }
+            Unmapped::Focus { travel_mm, limit_mm, .. } => {
+                (format!("{travel_mm:.4} mm"), format!("±{limit_mm} mm"))
+            }
             Unmapped::Angles { angles, limit } => {
                 (format!("({}, {})", degrees(angles.x_rad), degrees(angles.y_rad)), limit.into())
             }
@@ -98,7 +118,7 @@ impl FieldError {
 /// * `table`: of this machine
 ///
 /// # Errors
-/// The first place that optics, table or mirrors do not reach.
+/// The first place that optics, table, mirrors or focusing lens do not reach.
 ///
 /// # Limits
 /// Behind an F-theta lens a height moves the focus alone; what else it does is left to the table's
@@ -121,8 +141,20 @@ pub fn angles_of(
             None => nominal,
         };
         check_angles(machine, place_mm, angles)?;
-        let focus_mm = path_difference_mm(&optics, place_mm) - height_mm;
-        let focus_mm = (has_focus || z_mm.is_some()).then_some(focus_mm);
+        let shift_mm = path_difference_mm(&optics, place_mm) - height_mm;
+        let focus_mm = match &machine.optics.focus {
+            Some(focus) => {
+                // From the nominal optics: the middle of the travel does not move with the plane.
+                let travel_mm = travel_of_shift_mm(&machine.optics, focus, shift_mm);
+                let limit_mm = focus.travel_mm;
+                if travel_mm.abs() > limit_mm {
+                    let z_mm = height_mm;
+                    return Err(Unmapped::Focus { place_mm, z_mm, travel_mm, limit_mm });
+                }
+                Some(travel_mm)
+            }
+            None => (has_focus || z_mm.is_some()).then_some(shift_mm),
+        };
         Ok(Mapped { place_mm, angles, focus_mm })
     };
     places.iter().map(|place| mapped(place).map_err(|what| at(place.line, what))).collect()

@@ -11,6 +11,7 @@ pub mod error;
 pub mod exchange;
 pub mod field;
 pub mod field_calibration;
+pub mod focus_report;
 pub mod import;
 pub mod jump;
 pub mod jump_results;

@@ -7,10 +7,9 @@ use ftheta::formats::machine::{self, PRESETS};
 use ftheta::model::machine::{Lens, Machine as MachineFile};
 use ftheta::physics::audit::check_field;
 use ftheta::physics::galvo::Galvo;
-use ftheta::physics::laser::rayleigh_range_mm;
 use ftheta::physics::optics::scale_mm_per_rad;
 use ftheta::physics::servo::Gains;
-use ftheta::{Error, machines};
+use ftheta::{Error, focus_report, machines};
 use serde_json::{Value, json};
 
 /// Lists, shows or checks machines.
@@ -82,33 +81,34 @@ fn check(name: &str, as_json: bool) -> Result<(), Error> {
     let scale_mm = scale_mm_per_rad(&machine.optics);
     let acceleration_rad_s2 =
         scanner.torque_constant_n_m_a * scanner.current_max_a / scanner.inertia_kg_m2();
-    let laser = &machine.laser;
-    let rows = [
+    let mut rows = vec![
         ("servo_lag_us", gains.lag_s(&galvo) * 1e6),
         ("acceleration_max_rad_s2", acceleration_rad_s2),
         ("coil_time_constant_us", scanner.inductance_h / scanner.resistance_ohm * 1e6),
         ("field_mm_per_rad", scale_mm),
         ("word_step_um", machine.output.word_step_rad() * scale_mm * 1e3),
-        ("spot_diameter_um", laser.spot_diameter_mm * 1e3),
-        (
-            "rayleigh_range_mm",
-            rayleigh_range_mm(laser.wavelength_nm, laser.beam_quality_m2, laser.spot_diameter_mm),
-        ),
     ];
+    let focus = focus_report::report(&machine);
+    rows.extend(focus.rows);
     if as_json {
         let mut object: Value =
             rows.iter().map(|&(key, value)| (key.to_owned(), Value::from(value))).collect();
         object["name"] = json!(machine.name);
+        object["warnings"] = focus.warnings.iter().map(ToString::to_string).collect();
         json::print(&object);
         return Ok(());
     }
-    let lens = match machine.optics.lens {
-        Lens::FTheta { .. } => "F-theta lens",
-        Lens::PostObjective { .. } => "post-objective",
+    let lens = match (&machine.optics.lens, &machine.optics.focus) {
+        (Lens::FTheta { .. }, _) => "F-theta lens",
+        (Lens::PostObjective { .. }, None) => "post-objective",
+        (Lens::PostObjective { .. }, Some(_)) => "post-objective, dynamic focus",
     };
     say!("{}: {lens}, field {} mm: good", machine.name, machine.optics.field_mm);
     for (key, value) in rows {
         say!("  {key:24} {value:.6}");
+    }
+    for warning in focus.warnings {
+        say!("warning: {warning}");
     }
     Ok(())
 }

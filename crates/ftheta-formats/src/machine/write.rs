@@ -92,6 +92,18 @@ fn optics(machine: &Machine, out: &mut String) {
     };
     text(out, "first_mirror", first);
     scaled(out, "field_mm", machine.optics.field_mm, 1.0);
+    if let Some(aperture_mm) = machine.optics.aperture_mm {
+        scaled(out, "aperture_mm", aperture_mm, 1.0);
+    }
+    if let Some(focus) = &machine.optics.focus {
+        out.push_str("\n[optics.focus]\n");
+        scaled(out, "magnification", focus.magnification, 1.0);
+        scaled(out, "travel_mm", focus.travel_mm, 1.0);
+        scaled(out, "speed_max_mm_s", focus.speed_max_mm_s, 1.0);
+        scaled(out, "acceleration_max_mm_s2", focus.acceleration_max_mm_s2, 1.0);
+        scaled(out, "lag_us", focus.lag_s, 1e-6);
+        let _ = writeln!(out, "balanced = {}", focus.balanced);
+    }
 }
 
 fn laser(machine: &Machine, out: &mut String) {

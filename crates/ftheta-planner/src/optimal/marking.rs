@@ -1,5 +1,6 @@
 //! One mark after the other: its speed, its corners, its light.
 
+use super::lens::LensAxis;
 use super::path::Path;
 use super::pieces::Piece;
 use super::speed::{SpeedLimits, averaged_mm, time_at_s};
@@ -85,11 +86,12 @@ impl Marking<'_> {
         [from_centre, to_centre]: [bool; 2],
     ) -> Result<(), PlanError> {
         if from_centre {
-            // Long enough for an on edge that comes early.
+            // Long enough for an on edge that comes early, and for the first commands of a lens.
             let latency_ns = self.weave.machine.laser.on_latency_ns.max(0) as u64;
             let period_ns = u64::from(self.weave.machine.output.period_ns);
             let n_early = latency_ns.div_ceil(period_ns) as u32;
-            self.weave.rest_in_centre(N_REST_TICKS.max(n_early));
+            let n_lens = self.weave.lens.as_ref().map_or(0, LensAxis::n_lag_ticks);
+            self.weave.rest_in_centre(N_REST_TICKS.max(n_early).max(n_lens));
         }
         marks.into_iter().try_for_each(|mark| self.mark(mark))?;
         if to_centre && !self.weave.fly_home()? {
@@ -107,7 +109,7 @@ impl Marking<'_> {
         let Some(path) = Path::new(&mark).or_else(|| Path::straight(&mark.points)) else {
             return Ok(());
         };
-        let limits = self.limits(&pen);
+        let limits = self.limits(&pen, &path);
         let sky = match self.options.corner {
             Corner::Sky => true,
             Corner::Auto => !self.weave.machine.laser.power_modulated,
@@ -307,7 +309,19 @@ impl Marking<'_> {
         laser.minimum_on_ns.max(ordered_ns).max(1) as f64 * 1e-9
     }
 
-    fn limits(&self, pen: &Pen) -> SpeedLimits {
+    /// What limits the speed along a path: pen, motors, focusing lens.
+    fn limits(&self, pen: &Pen, path: &Path) -> SpeedLimits {
+        let mut limits = self.motor_limits(pen);
+        if let Some(lens) = &self.weave.lens {
+            let allowed = lens.limits(path, self.weave.smoothing);
+            limits.speed_mm_s = limits.speed_mm_s.min(allowed.speed_mm_s);
+            limits.acceleration_mm_s2 = limits.acceleration_mm_s2.min(allowed.acceleration_mm_s2);
+            limits.change_mm_s = limits.change_mm_s.min(allowed.change_mm_s);
+        }
+        limits
+    }
+
+    fn motor_limits(&self, pen: &Pen) -> SpeedLimits {
         let machine = self.weave.machine;
         let scanner = &machine.scanner;
         let scale = scale_mm_per_rad(&machine.optics);

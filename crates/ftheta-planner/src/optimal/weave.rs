@@ -3,6 +3,7 @@
 use super::fly_by::{FlyBy, States, Voltages};
 use super::glide::Glide;
 use super::heat::Heat;
+use super::lens::LensAxis;
 use super::path::Path;
 use super::relief::Strain;
 use super::smoothing::Smoothing;
@@ -31,6 +32,17 @@ pub(super) enum Mover<'a> {
     Angle(Glide, f64),
 }
 
+/// Shortest wait in the centre, ticks.
+const N_WAIT_MIN: usize = 2;
+
+/// Motion between marks.
+enum Flight {
+    /// At once.
+    Direct(Voltages),
+    /// To the centre, a wait there of so many ticks for the focusing lens, and on.
+    Waiting(Voltages, usize, Voltages),
+}
+
 /// A plan that grows.
 pub(super) struct Weave<'a> {
     pub(super) machine: &'a Machine,
@@ -38,6 +50,8 @@ pub(super) struct Weave<'a> {
     pub(super) smoothing: &'a Smoothing,
     pub(super) mover: &'a Mover<'a>,
     pub(super) draft: PlanDraft,
+    /// The focusing lens, if there is one.
+    pub(super) lens: Option<LensAxis<'a>>,
     n_samples: u64,
     heat: Heat,
     /// Where the axes are at the end of what is planned; `None` as long as they may be anywhere.
@@ -74,7 +88,8 @@ impl<'a> Weave<'a> {
     ) -> Self {
         let period_s = machine.output.period_s();
         let (n_samples, states) = (0, None);
-        Self { machine, inverse, smoothing, mover, draft, n_samples, heat, states, period_s }
+        let lens = LensAxis::new(machine);
+        Self { machine, inverse, smoothing, mover, draft, lens, n_samples, heat, states, period_s }
     }
 
     /// Stays in the centre for so many ticks.
@@ -99,10 +114,21 @@ impl<'a> Weave<'a> {
         self.period_s
     }
 
-    /// Whether the motors stand these voltages from a state, with the heat they have.
+    /// Whether the motors stand these voltages from a state, with the heat they have, and the
+    /// focusing lens follows them.
     pub(super) fn allows(&self, voltages: &[[f64; 2]], from: &States) -> bool {
         match self.mover {
-            Mover::Voltage(fly_by) => fly_by.allows(voltages, from, &self.heat),
+            Mover::Voltage(fly_by) => {
+                let follows = |lens: &LensAxis<'_>| {
+                    let mut states = vec![*from];
+                    for pair in voltages {
+                        let last = states[states.len() - 1];
+                        states.push([0, 1].map(|axis| fly_by.advance(&last[axis], pair[axis])));
+                    }
+                    lens.follows(&states)
+                };
+                fly_by.allows(voltages, from, &self.heat) && self.lens.as_ref().is_none_or(follows)
+            }
             Mover::Angle(..) => false,
         }
     }
@@ -185,6 +211,9 @@ impl<'a> Weave<'a> {
     /// If a program fails.
     pub(super) fn can_leave(&self, laid: &Laid) -> Result<bool, PlanError> {
         let rest = [State::zeros(); 2];
+        if self.lens.as_ref().is_some_and(|lens| !lens.can_stop(lens.state(&laid.ends))) {
+            return Ok(false);
+        }
         match self.mover {
             Mover::Voltage(fly_by) if !fly_by.has_room(&laid.ends) => {
                 let cold = self.heat.cold();
@@ -205,18 +234,56 @@ impl<'a> Weave<'a> {
 
     fn fly(&mut self, to: States) -> Result<bool, PlanError> {
         if let Some(from) = &self.states {
-            let n_dark = self.n_dark_ticks();
-            let motion = match self.mover {
-                Mover::Voltage(fly_by) => fly_by.between([from, &to], &self.heat, n_dark)?,
-                Mover::Angle(glide, _) => glide.between(from, &to, n_dark),
-            };
-            let Some(pairs) = motion else {
-                return Ok(false);
-            };
-            self.drive(None, &pairs);
+            match self.flight([from, &to], self.n_dark_ticks())? {
+                None => return Ok(false),
+                Some(Flight::Direct(pairs)) => self.drive(None, &pairs),
+                Some(Flight::Waiting(out, n_wait, back)) => {
+                    self.drive(None, &out);
+                    self.rest_in_centre(n_wait as u32);
+                    self.drive(None, &back);
+                }
+            }
         }
         self.states = Some(to);
         Ok(true)
+    }
+
+    /// Motion between states that the focusing lens is ready after; `None` if there is no room.
+    fn flight(&self, [from, to]: [&States; 2], n_dark: usize) -> Result<Option<Flight>, PlanError> {
+        let direct = self.between([from, to], n_dark)?;
+        let Some(lens) = &self.lens else {
+            return Ok(direct.map(Flight::Direct));
+        };
+        let ends = [lens.state(from), lens.state(to)];
+        let ready = |pairs: &Voltages| lens.reaches(ends, pairs.len());
+        if let Some(pairs) = direct.filter(ready) {
+            return Ok(Some(Flight::Direct(pairs)));
+        }
+        let rest = [State::zeros(); 2];
+        let (Some(n_lens), Some(out), Some(back)) = (
+            lens.n_ticks(ends, n_dark),
+            self.between([from, &rest], n_dark)?,
+            self.between([&rest, to], 0)?,
+        ) else {
+            return Ok(None);
+        };
+        // Mirrors that take longer swing wide, so where there is time for it they stop.
+        let n_ways = out.len() + back.len() + N_WAIT_MIN;
+        if n_lens < n_ways
+            && let Some(pairs) = self.between([from, to], n_lens)?.filter(ready)
+            && pairs.len() < n_ways
+        {
+            return Ok(Some(Flight::Direct(pairs)));
+        }
+        let wait = |n_ticks: usize| Flight::Waiting(out, n_ticks - n_ways + N_WAIT_MIN, back);
+        Ok(lens.n_ticks(ends, n_ways).map(wait))
+    }
+
+    fn between(&self, ends: [&States; 2], n_least: usize) -> Result<Option<Voltages>, PlanError> {
+        Ok(match self.mover {
+            Mover::Voltage(fly_by) => fly_by.between(ends, &self.heat, n_least)?,
+            Mover::Angle(glide, _) => glide.between(ends[0], ends[1], n_least),
+        })
     }
 
     /// Fewest ticks until a mark may begin, so that the laser is not told of it before it is told
@@ -304,10 +371,18 @@ impl<'a> Weave<'a> {
         places
     }
 
-    /// Ticks at which a track asks driver or coils for more than they stand.
+    /// Ticks at which a track asks driver, coils or focusing lens for more than they stand.
     ///
     /// * `places`: with those that weights need
     pub(super) fn strains(&self, places: &[Point], n_ticks: u32) -> Vec<Strain> {
+        let mut strains = self.motor_strains(places, n_ticks);
+        if let Some(lens) = &self.lens {
+            strains.extend(lens.strains(places, n_ticks));
+        }
+        strains
+    }
+
+    fn motor_strains(&self, places: &[Point], n_ticks: u32) -> Vec<Strain> {
         let Mover::Voltage(fly_by) = self.mover else {
             return Vec::new();
         };

@@ -32,6 +32,8 @@ pub fn machine() -> Machine {
             lens: Lens::FTheta { coefficients_mm: vec![160.0] },
             first_mirror: Axis::Y,
             field_mm: 120.0,
+            aperture_mm: None,
+            focus: None,
         },
         laser: Laser {
             wavelength_nm: 1064.0,
