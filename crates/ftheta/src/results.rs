@@ -106,6 +106,14 @@ fn settings_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
     if let Some(pulse_khz) = laser.pulse_khz {
         rows.insert(1, ("Pulse rate", format!("{pulse_khz} kHz")));
     }
+    if let Some(table) = &about.options.table {
+        let (n, about) = (table.planes()[0].angles.n_nodes(), table.about());
+        let text = format!("{}, {n} × {n}, {} round(s)", about.model, about.n_rounds);
+        rows.push(("Correction table", text));
+    }
+    if about.options.head.is_some() {
+        rows.push(("Head of the twin", "with mounting errors".into()));
+    }
     let rows = rows.into_iter().map(|(key, value)| (key.to_owned(), value));
     let planned = match marked.plan.planner {
         Planner::Classic => delay_rows(&marked.settings),
