@@ -1,7 +1,7 @@
 //! Which way the axes of a head run: swapped, mirrored, and which mirror comes first.
 
 use crate::mark::Mark;
-use ftheta_model::machine::{Axis, Lens, Optics};
+use ftheta_model::machine::{Axis, Optics};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_physics::optics::field_from_angles;
 use nalgebra::{DMatrix, Matrix2};
@@ -114,14 +114,6 @@ fn in_order(first_mirror: Axis, place: FieldPoint) -> FieldPoint {
     match first_mirror {
         Axis::X => place,
         Axis::Y => FieldPoint::new(place.y_mm, place.x_mm),
-    }
-}
-
-/// First coefficient of the lens, or the working distance, mm.
-pub fn focal_mm(optics: &Optics) -> f64 {
-    match &optics.lens {
-        Lens::FTheta { coefficients_mm } => coefficients_mm[0],
-        Lens::PostObjective { working_distance_mm, .. } => *working_distance_mm,
     }
 }
 

@@ -1,7 +1,6 @@
 //! The entry: marks in, a calibration out.
 
-pub use crate::accuracy::Spread;
-use crate::accuracy::distance_mm;
+use crate::accuracy::{Spread, distance_mm};
 use crate::axes::Axes;
 use crate::error::CalibrateError;
 use crate::mark::Mark;
@@ -14,7 +13,7 @@ use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_model::warning::Warning;
 use ftheta_physics::head::{Head, solve};
 use ftheta_physics::optics::angles_from_field;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 
 /// What the error of a field is described by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -278,7 +277,7 @@ impl Calibration {
     ///
     /// * `nominal`: what the nominal optics ask for there
     pub fn command(&self, place: FieldPoint, nominal: MirrorAngles) -> Option<MirrorAngles> {
-        solve(place, self.turned(nominal), |c| self.place(c), |c| self.jacobian(c))
+        solve(place, self.turned(nominal), |command| self.place(command))
     }
 
     /// Nominal angles the way the axes run.
@@ -297,26 +296,32 @@ impl Calibration {
     ///
     /// * `n_side`: marks along each side of the grid
     pub fn forecast_mm(&self, n_side: usize) -> Option<f64> {
-        self.physical.forecast_mm(&self.grid_commands(n_side)?, &self.grid_commands(N_FORECAST)?)
-    }
-
-    /// Commands of a grid over the square of the targets.
-    fn grid_commands(&self, n_side: usize) -> Option<Vec<MirrorAngles>> {
         let half_mm = self.expected_map.half_mm;
-        let at = |k: usize| half_mm * (2.0 * k as f64 / (n_side - 1) as f64 - 1.0);
-        let places = (0..n_side * n_side).map(|k| FieldPoint::new(at(k % n_side), at(k / n_side)));
-        places.map(|place| self.command(place, angles_from_field(&self.optics, place)?)).collect()
+        let commands = |n_side: usize| -> Option<Vec<_>> {
+            let grid = self.grid_commands(half_mm, n_side).ok()?;
+            Some(grid.into_iter().map(|(_, command)| command).collect())
+        };
+        self.physical.forecast_mm(&commands(n_side)?, &commands(N_FORECAST)?)
     }
 
-    fn jacobian(&self, command: MirrorAngles) -> Matrix2<f64> {
-        const STEP_RAD: f64 = 1e-4;
-        let at = |dx: f64, dy: f64| {
-            let p = self.place(MirrorAngles::new(command.x_rad + dx, command.y_rad + dy));
-            Vector2::new(p.x_mm, p.y_mm)
+    /// Commands for a grid over a square in the middle of the field.
+    ///
+    /// # Errors
+    /// The first place that is not reached.
+    fn grid_commands(
+        &self,
+        half_mm: f64,
+        n_side: usize,
+    ) -> Result<Vec<(FieldPoint, MirrorAngles)>, CalibrateError> {
+        let at = |k: usize| half_mm * (2.0 * k as f64 / (n_side - 1) as f64 - 1.0);
+        let with_command = |k: usize| {
+            let place = FieldPoint::new(at(k % n_side), at(k / n_side));
+            let nominal = angles_from_field(&self.optics, place);
+            let command = nominal.and_then(|nominal| self.command(place, nominal));
+            let FieldPoint { x_mm, y_mm } = place;
+            Ok((place, command.ok_or(CalibrateError::Unreachable { x_mm, y_mm })?))
         };
-        let columns =
-            [at(STEP_RAD, 0.0) - at(-STEP_RAD, 0.0), at(0.0, STEP_RAD) - at(0.0, -STEP_RAD)];
-        Matrix2::from_columns(&columns.map(|column| column / (2.0 * STEP_RAD)))
+        (0..n_side * n_side).map(with_command).collect()
     }
 
     /// What each mark would be off if it had not been used.
@@ -343,19 +348,8 @@ impl Calibration {
     fn expect(&mut self, marks: &[Mark]) -> Result<(), CalibrateError> {
         let targets: Vec<_> = marks.iter().map(|mark| mark.target).collect();
         let half_mm = sanity::reach_mm(&targets);
-        let at = |index: usize| half_mm * (2.0 * index as f64 / (N_PLACES - 1) as f64 - 1.0);
-        let places: Vec<_> = (0..N_PLACES * N_PLACES)
-            .map(|index| FieldPoint::new(at(index % N_PLACES), at(index / N_PLACES)))
-            .collect();
-        let command = |&place: &FieldPoint| {
-            let nominal = angles_from_field(&self.optics, place)?;
-            self.command(place, nominal)
-        };
-        let mut commands = Vec::with_capacity(places.len());
-        for place in &places {
-            let FieldPoint { x_mm, y_mm } = *place;
-            commands.push(command(place).ok_or(CalibrateError::Unreachable { x_mm, y_mm })?);
-        }
+        let (places, commands): (Vec<_>, Vec<_>) =
+            self.grid_commands(half_mm, N_PLACES)?.into_iter().unzip();
         let (open_mm, greatest_mm) = self.physical.expected_mm(&commands);
         let off = |(open, (command, place)): (&f64, (&MirrorAngles, &FieldPoint))| {
             let off_mm = match &self.surface {

@@ -27,6 +27,17 @@ pub enum CalibrateError {
         /// Root mean square along it, mm.
         along_mm: f64,
     },
+    /// Marks of a drift that lie too near to each other.
+    #[error(
+        "the marks spread {spread_rad:.4} rad of the mirror along an axis, the limit is {limit_rad} \
+         rad: take marks near the field's corners"
+    )]
+    Narrow {
+        /// Root mean square along the axis, mechanical rad.
+        spread_rad: f64,
+        /// Least spread, rad.
+        limit_rad: f64,
+    },
     /// Numbers of another unit, most likely.
     #[error(
         "the measured field is {ratio:.4} times as large as the targets: {suspicion}; give both in \

@@ -3,7 +3,7 @@
 //! [`calibrate::calibrate`] is the entry: marks in, a [`calibrate::Calibration`] out, which says
 //! what it found and makes tables.
 
-mod accuracy;
+pub mod accuracy;
 pub mod axes;
 pub mod calibrate;
 pub mod error;

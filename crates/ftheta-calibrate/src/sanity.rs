@@ -1,11 +1,12 @@
 //! Marks that cannot be meant: too few, on a line, in inches, in the wrong columns.
 
-use crate::axes::{affine, focal_mm};
+use crate::axes::affine;
 use crate::error::CalibrateError;
 use crate::mark::Mark;
 use ftheta_model::machine::Optics;
 use ftheta_model::space::FieldPoint;
 use ftheta_model::warning::Warning;
+use ftheta_physics::optics::scale_mm_per_rad;
 use nalgebra::Matrix2;
 use std::collections::BTreeSet;
 
@@ -59,7 +60,7 @@ pub fn check(optics: &Optics, marks: &[Mark]) -> Result<Vec<Warning>, CalibrateE
         return Err(CalibrateError::Unrelated { rms_mm, field_mm });
     }
     if !(SIZE[0]..=SIZE[1]).contains(&ratio) {
-        return Err(CalibrateError::Size { ratio, focal_mm: focal_mm(optics) });
+        return Err(CalibrateError::Size { ratio, focal_mm: 0.5 * scale_mm_per_rad(optics) });
     }
     Ok(warnings(optics, marks, ratio))
 }
@@ -71,7 +72,7 @@ fn warnings(optics: &Optics, marks: &[Mark], ratio: f64) -> Vec<Warning> {
         warn(format!(
             "the measured field is {ratio:.4} times as large as the targets: check the focal \
              length in the machine file ({} mm)",
-            focal_mm(optics)
+            0.5 * scale_mm_per_rad(optics)
         ));
     }
     let covers = |sign_x: f64, sign_y: f64| {

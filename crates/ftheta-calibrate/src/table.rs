@@ -4,7 +4,7 @@ use crate::calibrate::Calibration;
 use crate::error::CalibrateError;
 use ftheta_model::machine::Machine;
 use ftheta_model::space::{FieldPoint, MirrorAngles};
-use ftheta_physics::correction::{About, CorrectionPlane, CorrectionTable, Drift, optics_id};
+use ftheta_physics::correction::{About, CorrectionTable};
 use ftheta_physics::grid_map::{GridMap, Interpolation};
 use ftheta_physics::optics::field_from_angles;
 
@@ -47,14 +47,8 @@ impl Calibration {
         });
         let FieldPoint { x_mm, y_mm } = unreached;
         let angles = map.ok_or(CalibrateError::Unreachable { x_mm, y_mm })?;
-        let about = About {
-            machine: machine.name.clone(),
-            optics_id: optics_id(&machine.optics),
-            model: self.model.name().to_owned(),
-            n_rounds: self.n_rounds,
-        };
-        let plane = CorrectionPlane { z_mm: 0.0, angles };
-        Ok(CorrectionTable::new(about, vec![plane], Drift::NONE)?)
+        let about = About::of(machine, self.model.name(), self.n_rounds);
+        Ok(CorrectionTable::flat(about, angles)?)
     }
 
     /// Corrected from nominal angles; beyond what the optics reach, as a nearer place is.

@@ -7,7 +7,7 @@
 use crate::audit::CORRECTION_RESERVE;
 use crate::grid_map::GridMap;
 use crate::optics::field_from_angles;
-use ftheta_model::machine::{Axis, Lens, Optics, Scanner};
+use ftheta_model::machine::{Axis, Lens, Machine, Optics, Scanner};
 use ftheta_model::space::MirrorAngles;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -145,6 +145,20 @@ pub enum CorrectionError {
     },
 }
 
+impl About {
+    /// A table for a machine.
+    ///
+    /// * `model`: how it was made, one word
+    pub fn of(machine: &Machine, model: &str, n_rounds: u32) -> Self {
+        Self {
+            machine: machine.name.clone(),
+            optics_id: optics_id(&machine.optics),
+            model: model.to_owned(),
+            n_rounds,
+        }
+    }
+}
+
 impl CorrectionTable {
     /// Greatest magnitude of an angle in a table, rad: a right angle of the beam.
     pub const ANGLE_MAX_RAD: f64 = std::f64::consts::FRAC_PI_4;
@@ -173,6 +187,14 @@ impl CorrectionTable {
             plane.check()?;
         }
         Ok(Self { about, planes, drift })
+    }
+
+    /// A table of the nominal work plane alone, of which nothing has drifted.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn flat(about: About, angles: GridMap) -> Result<Self, CorrectionError> {
+        Self::new(about, vec![CorrectionPlane { z_mm: 0.0, angles }], Drift::NONE)
     }
 
     /// Where the table comes from.

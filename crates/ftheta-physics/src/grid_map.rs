@@ -102,11 +102,10 @@ impl GridMap {
 
     /// The values at a place; outside the square those of the nearest place on its border.
     #[inline]
-    pub fn value(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        let ((column, s), (row, t)) = (self.cell(u), self.cell(v));
+    pub fn value(&self, place: [f64; 2]) -> [f64; 2] {
         match self.interpolation {
-            Interpolation::Bilinear => self.blend(column + 1, row + 1, linear(s), linear(t)),
-            Interpolation::CatmullRom => self.blend(column, row, cubic(s), cubic(t)),
+            Interpolation::Bilinear => self.bilinear(place),
+            Interpolation::CatmullRom => self.catmull_rom(place),
         }
     }
 
@@ -116,15 +115,23 @@ impl GridMap {
     pub fn map(&self, places: &[[f64; 2]], values: &mut [[f64; 2]]) {
         let pairs = places.iter().zip(values);
         match self.interpolation {
-            Interpolation::Bilinear => pairs.for_each(|(&[u, v], value)| {
-                let ((column, s), (row, t)) = (self.cell(u), self.cell(v));
-                *value = self.blend(column + 1, row + 1, linear(s), linear(t));
-            }),
-            Interpolation::CatmullRom => pairs.for_each(|(&[u, v], value)| {
-                let ((column, s), (row, t)) = (self.cell(u), self.cell(v));
-                *value = self.blend(column, row, cubic(s), cubic(t));
-            }),
+            Interpolation::Bilinear => pairs.for_each(|(&at, value)| *value = self.bilinear(at)),
+            Interpolation::CatmullRom => {
+                pairs.for_each(|(&at, value)| *value = self.catmull_rom(at));
+            }
         }
+    }
+
+    #[inline(always)]
+    fn bilinear(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let ((column, s), (row, t)) = (self.cell(u), self.cell(v));
+        self.blend(column + 1, row + 1, linear(s), linear(t))
+    }
+
+    #[inline(always)]
+    fn catmull_rom(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let ((column, s), (row, t)) = (self.cell(u), self.cell(v));
+        self.blend(column, row, cubic(s), cubic(t))
     }
 
     /// Slopes of both values by u and by v: `[[du, dv], [du, dv]]`.

@@ -73,7 +73,7 @@ fn table(angles: impl Fn(f64, f64) -> [f64; 2]) -> Result<CorrectionTable, Corre
     let half_rad = 12.5f64.to_radians();
     let angles = GridMap::tabled(half_rad, BOTH[1], 65, |x, y| Some(angles(x, y))).unwrap();
     let about = About { optics_id: optics_id(&optics()), ..About::default() };
-    CorrectionTable::new(about, vec![CorrectionPlane { z_mm: 0.0, angles }], Drift::NONE)
+    CorrectionTable::flat(about, angles)
 }
 
 fn scanner() -> ftheta_model::machine::Scanner {

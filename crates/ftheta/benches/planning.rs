@@ -23,7 +23,7 @@ use ftheta::model::machine::Machine;
 use ftheta::model::recipe::{Pen, Recipe};
 use ftheta::model::toolpath::{Mark, Toolpath};
 use ftheta::physics::audit::audit;
-use ftheta::physics::correction::{About, CorrectionPlane, CorrectionTable, Drift};
+use ftheta::physics::correction::{About, CorrectionTable};
 use ftheta::physics::grid_map::{GridMap, Interpolation};
 use ftheta::physics::plan::Plan;
 use ftheta::physics::servo::Gains;
@@ -173,14 +173,7 @@ fn tracks(chord_um: u32) -> Plan {
 #[divan::bench(args = [5, 50])]
 fn render_tracks(bencher: Bencher, chord_um: u32) {
     let plan = tracks(chord_um);
-    let renderer = Renderer::new(&plan);
-    let mut block = Block::default();
-    bencher.counter(ItemsCount::new(plan.n_samples())).bench_local(|| {
-        let mut renderer = renderer.clone();
-        while renderer.next_block(&mut block) {
-            black_box(&block);
-        }
-    });
+    render(bencher, &plan, &Renderer::new(&plan));
 }
 
 /// The same through a correction table.
@@ -190,9 +183,11 @@ fn render_tracks_corrected(bencher: Bencher, chord_um: u32) {
     let half_rad = plan.machine.scanner.angle_max_rad;
     let bent = |x: f64, y: f64| Some([1.002 * x + 0.01 * x * y, 0.999 * y - 0.01 * x * x + 1e-4]);
     let angles = GridMap::tabled(half_rad, Interpolation::CatmullRom, 65, bent).unwrap();
-    let plane = CorrectionPlane { z_mm: 0.0, angles };
-    let table = CorrectionTable::new(About::default(), vec![plane], Drift::NONE).unwrap();
-    let renderer = Renderer::new(&plan).correct_by(&table);
+    let table = CorrectionTable::flat(About::default(), angles).unwrap();
+    render(bencher, &plan, &Renderer::new(&plan).correct_by(&table));
+}
+
+fn render(bencher: Bencher, plan: &Plan, renderer: &Renderer<'_>) {
     let mut block = Block::default();
     bencher.counter(ItemsCount::new(plan.n_samples())).bench_local(|| {
         let mut renderer = renderer.clone();

@@ -13,7 +13,6 @@ use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::text_table::error::TableError;
 use ftheta_formats::toml_table::TomlError;
 use ftheta_physics::audit::AuditError;
-use ftheta_physics::correction::CorrectionError;
 use ftheta_physics::mechanism::MechanismError;
 use ftheta_physics::servo::ServoError;
 use ftheta_planner::PlanError;
@@ -128,14 +127,6 @@ pub enum Error {
     /// Measured marks give no calibration.
     #[error(transparent)]
     Calibrate(#[from] CalibrateError),
-    /// A correction table that this machine cannot use.
-    #[error("{path}: {source}", path = path.display())]
-    Correction {
-        /// The table.
-        path: PathBuf,
-        /// What is wrong.
-        source: CorrectionError,
-    },
     /// Commands of a controller in a table of points.
     #[error("{path}: it holds commands of a controller, say how many of its units are a millimetre with --units-per-mm", path = path.display())]
     Units {
@@ -251,9 +242,6 @@ impl Error {
             Self::CorFile { path, source } => in_file(path, source.fault()),
             Self::Exchange { path, source } => in_file(path, source.fault()),
             Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
-            Self::Correction { path, source } => {
-                (path.display().to_string(), source.to_string(), String::new())
-            }
             Self::Units { path } => {
                 (path.display().to_string(), "no --units-per-mm".into(), "above 0".into())
             }

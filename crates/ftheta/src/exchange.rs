@@ -8,9 +8,7 @@ use ftheta_formats::cor_file::{CorTable, N_SIDE, PITCH_UNITS};
 use ftheta_formats::grid_csv::OffsetGrid;
 use ftheta_model::machine::Machine;
 use ftheta_model::space::{FieldPoint, MirrorAngles};
-use ftheta_physics::correction::{
-    About, CorrectionError, CorrectionPlane, CorrectionTable, Drift, optics_id,
-};
+use ftheta_physics::correction::{About, CorrectionError, CorrectionTable};
 use ftheta_physics::grid_map::{GridMap, Interpolation};
 use ftheta_physics::optics::{angles_from_field, field_from_angles, scale_mm_per_rad};
 use thiserror::Error;
@@ -119,13 +117,7 @@ pub fn table(grid: &OffsetGrid, machine: &Machine) -> Result<CorrectionTable, Ex
         corrected.iter().all(|angle| angle.is_finite()).then_some(corrected)
     });
     let angles = angles.ok_or(ExchangeError::Optics)?;
-    let about = About {
-        machine: machine.name.clone(),
-        optics_id: optics_id(&machine.optics),
-        model: "imported".into(),
-        n_rounds: 0,
-    };
-    Ok(CorrectionTable::new(about, vec![CorrectionPlane { z_mm: 0.0, angles }], Drift::NONE)?)
+    Ok(CorrectionTable::flat(About::of(machine, "imported", 0), angles)?)
 }
 
 /// Offsets in the units of a `.cor` table, over the machine's field.

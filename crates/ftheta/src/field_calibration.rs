@@ -3,8 +3,8 @@
 
 use crate::Error;
 use crate::field::corrected;
-use ftheta_calibrate::axes::focal_mm;
-use ftheta_calibrate::calibrate::{CalibrateOptions, Calibration, Model, Spread, calibrate};
+use ftheta_calibrate::accuracy::{Spread, distance_mm};
+use ftheta_calibrate::calibrate::{CalibrateOptions, Calibration, Model, calibrate};
 use ftheta_calibrate::error::CalibrateError;
 use ftheta_calibrate::mark::Mark;
 use ftheta_calibrate::table::Grid;
@@ -13,7 +13,7 @@ use ftheta_model::machine::Machine;
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_model::warning::Warning;
 use ftheta_physics::correction::{CorrectionTable, Drift};
-use ftheta_physics::optics::angles_from_field;
+use ftheta_physics::optics::{angles_from_field, scale_mm_per_rad};
 use ftheta_report::calibration_report::{
     AxesFound, CalibrationReportInput, ErrorMap, ErrorSummary, ReportParameter, ReportPoint,
     calibration_report_html,
@@ -122,67 +122,68 @@ pub fn calibrate_drift(
     table: CorrectionTable,
     points: &[MeasuredPoint],
 ) -> Result<(CorrectionTable, DriftFound), Error> {
-    let through = MarkedThrough::Table(Box::new(table.clone()));
-    let mut rows = Vec::with_capacity(points.len());
-    for point in points {
-        let sent = command(machine, &through, point)?;
-        let seen = MeasuredPoint { target_mm: point.measured_mm, ..*point };
-        // Had the head not moved, these commands would have made the mark where it was found.
-        let there = command(machine, &through, &seen)?;
-        rows.push([[sent.x_rad, there.x_rad], [sent.y_rad, there.y_rad]]);
-    }
-    let drift = fit_drift(table.drift(), &rows)?;
-    let moved = table.clone().with_drift(drift);
-    moved.check_limits(&machine.scanner, &machine.optics).map_err(CalibrateError::from)?;
-    let distance = |point: &MeasuredPoint, there: FieldPoint| {
-        let at = point.target_mm;
-        (there.x_mm - at.x_mm).hypot(there.y_mm - at.y_mm)
+    let commands = |table: &CorrectionTable, points: &[MeasuredPoint]| {
+        let through = MarkedThrough::Table(Box::new(table.clone()));
+        points.iter().map(|point| command(machine, &through, point)).collect::<Result<Vec<_>, _>>()
     };
-    let before = Spread::of(points.iter().map(|point| distance(point, point.measured_mm)));
-    let left = |point: &MeasuredPoint| {
-        // What the new table would have changed, in the field, added to where the mark was found.
-        let seen = MeasuredPoint { target_mm: point.measured_mm, ..*point };
-        let old = command(machine, &through, &seen)?;
-        let new = command(machine, &MarkedThrough::Table(Box::new(moved.clone())), &seen)?;
-        let scale = 2.0 * focal_mm(&machine.optics);
+    let sent = commands(&table, points)?;
+    // Had the head not moved, these commands would have made the marks where they were found.
+    let seen: Vec<_> = points
+        .iter()
+        .map(|point| MeasuredPoint { target_mm: point.measured_mm, ..*point })
+        .collect();
+    let there = commands(&table, &seen)?;
+    let moved = table.clone().with_drift(fit_drift(table.drift(), &sent, &there)?);
+    moved.check_limits(&machine.scanner, &machine.optics).map_err(CalibrateError::from)?;
+    let off = |point: &MeasuredPoint| distance_mm(point.measured_mm, point.target_mm);
+    let before = Spread::of(points.iter().map(off));
+    // What the new table changes, in the field, is added to where the marks were found.
+    let scale = scale_mm_per_rad(&machine.optics);
+    let changed = there.iter().zip(commands(&moved, &seen)?);
+    let after = Spread::of(points.iter().zip(changed).map(|(point, (old, new))| {
         let FieldPoint { x_mm, y_mm } = point.measured_mm;
         let there = FieldPoint::new(
             x_mm + scale * (new.x_rad - old.x_rad),
             y_mm + scale * (new.y_rad - old.y_rad),
         );
-        Ok::<f64, Error>(distance(point, there))
-    };
-    let after: Vec<f64> = points.iter().map(left).collect::<Result<_, _>>()?;
-    Ok((moved, DriftFound { before, after: Spread::of(after.into_iter()) }))
+        distance_mm(there, point.target_mm)
+    }));
+    Ok((moved, DriftFound { before, after }))
 }
 
 /// Gain and offset of each axis that make up for what moved, on top of those there are.
 ///
-/// * `rows`: of each mark and axis what was sent, and what the place found would have asked for
-fn fit_drift(drift: Drift, rows: &[[[f64; 2]; 2]]) -> Result<Drift, CalibrateError> {
-    let n_marks = rows.len();
+/// * `sent`: what made the marks
+/// * `there`: what the places at which they were found would have asked for
+fn fit_drift(
+    drift: Drift,
+    sent: &[MirrorAngles],
+    there: &[MirrorAngles],
+) -> Result<Drift, CalibrateError> {
+    let n_marks = sent.len();
     if n_marks < N_DRIFT {
         return Err(CalibrateError::TooFew { n_marks, model: "drift", limit: N_DRIFT });
     }
+    let n = n_marks as f64;
     let mut moved = drift;
-    for axis in 0..2 {
-        let n = n_marks as f64;
-        let mean = |k: usize| rows.iter().map(|row| row[axis][k]).sum::<f64>() / n;
-        let (sent, there) = (mean(0), mean(1));
-        let product = |k: usize| {
-            rows.iter().map(|row| (row[axis][1] - there) * (row[axis][k] - [sent, there][k])).sum()
-        };
-        let (by_sent, by_there): (f64, f64) = (product(0), product(1));
+    let of_axis: [fn(&MirrorAngles) -> f64; 2] = [|angles| angles.x_rad, |angles| angles.y_rad];
+    for (axis, of_axis) in of_axis.into_iter().enumerate() {
+        let mean = |all: &[MirrorAngles]| all.iter().map(of_axis).sum::<f64>() / n;
+        let (sent_mean, there_mean) = (mean(sent), mean(there));
+        let (mut by_sent, mut by_there) = (0.0, 0.0);
+        for (sent, there) in sent.iter().zip(there) {
+            let off = of_axis(there) - there_mean;
+            by_sent += off * (of_axis(sent) - sent_mean);
+            by_there += off * off;
+        }
         let spread_rad = (by_there / n).sqrt();
         if spread_rad < DRIFT_SPREAD_RAD {
-            let (across_mm, along_mm) = (spread_rad, DRIFT_SPREAD_RAD);
-            return Err(CalibrateError::Collinear { across_mm, along_mm });
+            return Err(CalibrateError::Narrow { spread_rad, limit_rad: DRIFT_SPREAD_RAD });
         }
         // The head answers `there` to `sent`, so `there` needs gain · there + offset.
         let gain = by_sent / by_there;
-        let offset_rad = sent - gain * there;
         moved.gain[axis] = gain * drift.gain[axis];
-        moved.offset_rad[axis] = gain * drift.offset_rad[axis] + offset_rad;
+        moved.offset_rad[axis] = gain * drift.offset_rad[axis] + (sent_mean - gain * there_mean);
     }
     Ok(moved)
 }
@@ -200,7 +201,7 @@ fn command(
     match through {
         MarkedThrough::Nominal => Ok(nominal()?),
         MarkedThrough::Linear => {
-            let scale = 2.0 * focal_mm(&machine.optics);
+            let scale = scale_mm_per_rad(&machine.optics);
             Ok(MirrorAngles::new(x_mm / scale, y_mm / scale))
         }
         MarkedThrough::Table(table) => {
@@ -233,10 +234,10 @@ fn advice(calibration: &Calibration, marks: &[Mark]) -> Vec<String> {
             .push("Leave out --model: the physical model is the better one for most heads".into());
     }
     let now_mm = calibration.expected.rms_mm;
-    for n_side in FORECASTS {
+    for n_side in FORECASTS.into_iter().filter(|n_side| n_side * n_side >= marks.len()) {
         let n_marks = n_side * n_side;
         let forecast = calibration.forecast_mm(n_side).filter(|&mm| mm < WORTH * now_mm);
-        if let Some(forecast_mm) = forecast.filter(|_| n_marks >= marks.len()) {
+        if let Some(forecast_mm) = forecast {
             advice.push(format!(
                 "Marking and measuring {n_marks} marks as well as these would bring the expected \
                  error from {expected_um:.1} to about {:.1} µm rms",

@@ -22,7 +22,6 @@ use kurbo::{BezPath, Circle, Line, Point, Shape as _, Vec2};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use std::fmt::Write as _;
 use std::path::Path;
 
 /// How a pattern is marked and measured.
@@ -135,13 +134,10 @@ pub fn write(points: &[(String, MeasuredPoint)], pattern: &Path, out: &Path) -> 
     if points.is_empty() {
         return Err(Error::NoSights { path: pattern.into() });
     }
-    let mut text = String::from("target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark\n");
-    for (id, MeasuredPoint { target_mm, measured_mm, round, .. }) in points {
-        let (x, y) = (target_mm.x_mm + 0.0, target_mm.y_mm + 0.0);
-        let FieldPoint { x_mm, y_mm } = measured_mm;
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "{x},{y},{x_mm:.6},{y_mm:.6},{round},{id}");
-    }
+    let rows = points
+        .iter()
+        .map(|(id, point)| (id.as_str(), point.target_mm, point.round, Some(point.measured_mm)));
+    let text = ftheta_formats::points::write(rows);
     write_file(out, text.as_bytes())
 }
 

@@ -5,7 +5,7 @@ use crate::{Error, exchange, import};
 use ftheta_formats::cor_file::{self, CorVersion, N_SIDE};
 use ftheta_formats::{correction_file, grid_csv};
 use ftheta_model::machine::Machine;
-use ftheta_physics::correction::CorrectionTable;
+use ftheta_physics::correction::{CorrectionError, CorrectionTable};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -40,9 +40,8 @@ impl TableKind {
 pub fn read(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
     let table = correction_file::read(&import::bytes(path)?)
         .map_err(|source| Error::CorrectionFile { path: path.into(), source })?;
-    table
-        .check_machine(&machine.name, &machine.optics)
-        .map_err(|error| Error::CorrectionFile { path: path.into(), source: error.into() })?;
+    let checked = table.check_machine(&machine.name, &machine.optics);
+    checked.map_err(|error| unusable(path, error))?;
     Ok(table)
 }
 
@@ -52,10 +51,13 @@ pub fn read(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
 /// As [`read`], or if an angle or speed could leave its limit.
 pub fn usable(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
     let table = read(path, machine)?;
-    table
-        .check_limits(&machine.scanner, &machine.optics)
-        .map_err(|source| Error::Correction { path: path.into(), source })?;
+    let checked = table.check_limits(&machine.scanner, &machine.optics);
+    checked.map_err(|error| unusable(path, error))?;
     Ok(table)
+}
+
+fn unusable(path: &Path, error: CorrectionError) -> Error {
+    Error::CorrectionFile { path: path.into(), source: error.into() }
 }
 
 /// Writes a table as our own kind of file, or as another.

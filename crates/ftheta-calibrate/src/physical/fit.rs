@@ -160,6 +160,13 @@ fn right_marks(equations: &Linearised, posterior: &Posterior, used: &[bool]) -> 
     (0..used.len()).filter(|&mark| !used[mark]).filter(is_right).collect()
 }
 
+/// Squares of the distances that a posterior leaves open, one for every two rows, mm².
+fn left_open(posterior: &Posterior, jacobian: &DMatrix<f64>) -> Vec<f64> {
+    let square =
+        |index: usize| posterior.covariance(&jacobian.rows(2 * index, 2).into_owned()).trace();
+    (0..jacobian.nrows() / 2).map(square).collect()
+}
+
 fn head_values<'a>(model: &Model, estimate: &'a DVector<f64>) -> &'a [f64] {
     &estimate.as_slice()[..model.n_parameters()]
 }
@@ -270,30 +277,24 @@ impl Physical {
         .collect()
     }
 
+    /// What unknowns move at commands of the machine, mm.
+    fn jacobian(&self, commands: &[MirrorAngles]) -> DMatrix<f64> {
+        let turned: Vec<_> = commands.iter().map(|&c| self.model.axes.commands(c)).collect();
+        self.model.jacobian(&turned, &self.estimate)
+    }
+
     /// Errors to expect at `places` with `more` marks measured as well, mm rms.
     pub fn forecast_mm(&self, more: &[MirrorAngles], places: &[MirrorAngles]) -> Option<f64> {
-        let turned = |all: &[MirrorAngles]| -> Vec<_> {
-            all.iter().map(|&c| self.model.axes.commands(c)).collect()
-        };
-        let marks = self.model.jacobian(&turned(more), &self.estimate);
-        let posterior = self.sums.with(&marks).at(self.posterior.scales)?;
-        let jacobian = self.model.jacobian(&turned(places), &self.estimate);
-        let square: f64 = (0..places.len())
-            .map(|k| posterior.covariance(&jacobian.rows(2 * k, 2).into_owned()).trace())
-            .sum();
-        Some((square / places.len() as f64).sqrt())
+        let posterior = self.sums.with(&self.jacobian(more)).at(self.posterior.scales)?;
+        let squares = left_open(&posterior, &self.jacobian(places));
+        Some((squares.iter().sum::<f64>() / places.len() as f64).sqrt())
     }
 
     /// Errors that are left at commands: standard deviation of the distance at each, and the mean
     /// of the greatest one over fields drawn from what the marks leave open, mm.
     pub fn expected_mm(&self, commands: &[MirrorAngles]) -> (Vec<f64>, f64) {
-        let turned: Vec<_> = commands.iter().map(|&c| self.model.axes.commands(c)).collect();
-        let jacobian = self.model.jacobian(&turned, &self.estimate);
-        let mut square = vec![0.0; commands.len()];
-        for (index, square) in square.iter_mut().enumerate() {
-            let rows = jacobian.rows(2 * index, 2).into_owned();
-            *square = self.posterior.covariance(&rows).trace();
-        }
+        let jacobian = self.jacobian(commands);
+        let squares = left_open(&self.posterior, &jacobian);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
         let n_unknowns = self.model.n_unknowns();
         let greatest: f64 = (0..N_DRAWS)
@@ -305,6 +306,6 @@ impl Physical {
                 pairs.map(|pair| pair[0].hypot(pair[1])).fold(0.0, f64::max)
             })
             .sum();
-        (square.into_iter().map(f64::sqrt).collect(), greatest / N_DRAWS as f64)
+        (squares.into_iter().map(f64::sqrt).collect(), greatest / N_DRAWS as f64)
     }
 }

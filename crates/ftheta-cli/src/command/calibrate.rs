@@ -7,7 +7,8 @@ use crate::json;
 use crate::progress::Progress;
 use crate::screen::{note, say};
 use ftheta::atlas_store::AtlasStore;
-use ftheta::calibrate::calibrate::{CalibrateOptions, Noise, Spread};
+use ftheta::calibrate::accuracy::Spread;
+use ftheta::calibrate::calibrate::{CalibrateOptions, Noise};
 use ftheta::calibrate::table::Grid;
 use ftheta::field_calibration::{
     FieldCalibration, FieldOptions, MarkedThrough, calibrate_drift, calibrate_field,

@@ -1,4 +1,5 @@
-//! Measured points: where marks should be and where they are, from the tables people measure in.
+//! Measured points: where marks should be and where they are, from and to the tables people
+//! measure in.
 //!
 //! Columns are found by name: `target_x_mm,target_y_mm,measured_x_mm,measured_y_mm[,round]`, in any
 //! order. Tables of other programs are known by their names or shape: nominal places and errors,
@@ -50,6 +51,22 @@ impl Points {
             }
         }
     }
+}
+
+/// Writes a table of marks: name, target and round of each, and where it was found; a mark without
+/// is left to be filled in.
+pub fn write<'a>(
+    rows: impl IntoIterator<Item = (&'a str, FieldPoint, u32, Option<FieldPoint>)>,
+) -> String {
+    let mut out = String::from("target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark\n");
+    for (name, target, round, found) in rows {
+        // A zero has no sign here, however it came about.
+        let (x, y) = (target.x_mm + 0.0, target.y_mm + 0.0);
+        let found = found.map(|found| format!("{:.6},{:.6}", found.x_mm, found.y_mm));
+        let found = found.as_deref().unwrap_or(",");
+        out.push_str(&format!("{x},{y},{found},{round},{name}\n"));
+    }
+    out
 }
 
 /// Reads measured points.

@@ -126,15 +126,7 @@ impl Tracer {
     /// # Accuracy
     /// Central differences over 2e-4 rad: 1e-8 relative.
     pub fn jacobian(&self, commands: MirrorAngles) -> Matrix2<f64> {
-        const STEP_RAD: f64 = 1e-4;
-        let MirrorAngles { x_rad, y_rad } = commands;
-        let at = |dx: f64, dy: f64| {
-            let place = self.place(MirrorAngles::new(x_rad + dx, y_rad + dy));
-            Vector2::new(place.x_mm, place.y_mm)
-        };
-        let columns =
-            [at(STEP_RAD, 0.0) - at(-STEP_RAD, 0.0), at(0.0, STEP_RAD) - at(0.0, -STEP_RAD)];
-        Matrix2::from_columns(&columns.map(|column| column / (2.0 * STEP_RAD)))
+        jacobian(commands, |angles| self.place(angles))
     }
 
     /// The commands that put the beam on a place of the measuring frame, by Newton from `start`.
@@ -144,7 +136,7 @@ impl Tracer {
     /// # Accuracy
     /// 1e-9 mm in the field.
     pub fn commands(&self, place: FieldPoint, start: MirrorAngles) -> Option<MirrorAngles> {
-        solve(place, start, |angles| self.place(angles), |angles| self.jacobian(angles))
+        solve(place, start, |angles| self.place(angles))
     }
 
     fn on_plane(&self, ray: &Ray) -> (Vector2<f64>, f64) {
@@ -170,15 +162,27 @@ impl Tracer {
     }
 }
 
-/// Newton's method in two unknowns; `None` where 20 steps do not settle.
+/// How a place moves with commands, mm/rad: rows x and y, columns mirror 1 and 2, by central
+/// differences over 2e-4 rad.
+fn jacobian(commands: MirrorAngles, forward: impl Fn(MirrorAngles) -> FieldPoint) -> Matrix2<f64> {
+    const STEP_RAD: f64 = 1e-4;
+    let MirrorAngles { x_rad, y_rad } = commands;
+    let at = |dx: f64, dy: f64| {
+        let place = forward(MirrorAngles::new(x_rad + dx, y_rad + dy));
+        Vector2::new(place.x_mm, place.y_mm)
+    };
+    let columns = [at(STEP_RAD, 0.0) - at(-STEP_RAD, 0.0), at(0.0, STEP_RAD) - at(0.0, -STEP_RAD)];
+    Matrix2::from_columns(&columns.map(|column| column / (2.0 * STEP_RAD)))
+}
+
+/// The commands that put a beam on a place, by Newton; `None` where 20 steps do not settle.
 ///
 /// * `place`: mm, to be reached
-/// * `jacobian`: mm/rad
+/// * `forward`: where commands put the beam
 pub fn solve(
     place: FieldPoint,
     start: MirrorAngles,
     forward: impl Fn(MirrorAngles) -> FieldPoint,
-    jacobian: impl Fn(MirrorAngles) -> Matrix2<f64>,
 ) -> Option<MirrorAngles> {
     // Well below any word of a controller, above the rounding of the trace.
     const SETTLED_RAD: f64 = 1e-13;
@@ -186,7 +190,7 @@ pub fn solve(
     for _ in 0..20 {
         let now = forward(angles);
         let missing = Vector2::new(place.x_mm - now.x_mm, place.y_mm - now.y_mm);
-        let step = jacobian(angles).try_inverse()? * missing;
+        let step = jacobian(angles, &forward).try_inverse()? * missing;
         angles = MirrorAngles::new(angles.x_rad + step.x, angles.y_rad + step.y);
         let size = step.amax();
         if !size.is_finite() || size > 1.0 {

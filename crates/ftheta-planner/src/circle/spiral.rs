@@ -184,7 +184,10 @@ pub fn spiral(
     let turn_s = spiral.length_mm() / spiral.speed_mm_s;
     let n_track = ((turn_s / period_s - 1e-9).ceil() + 2.0 * N_AROUND) as u32;
     let (mut draft, motion) = tables(machine, spiral, options);
-    let states = |tick: u32| states_at(machine, &draft, &motion, tick);
+    let gains = Gains::design(&machine.scanner, period_s)?;
+    let inverse = Inverse::new(&Galvo::new(&machine.scanner), &gains, period_s);
+    let inverse = inverse.ok_or(PlanError::Immovable)?;
+    let states = |tick: u32| states_at(&inverse, &draft, &motion, tick);
     let (starts, ends) = (states(0)?, states(n_track)?);
     let passages = Passages::new(machine, options);
     let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
@@ -263,17 +266,14 @@ fn tables(machine: &Machine, spiral: &Spiral, options: &CircleOptions) -> (PlanD
 
 /// The states of both axes at a tick of the track.
 fn states_at(
-    machine: &Machine,
+    inverse: &Inverse,
     draft: &PlanDraft,
     motion: &Motion,
     tick: u32,
 ) -> Result<[State; 2], PlanError> {
-    let galvo = Galvo::new(&machine.scanner);
-    let tick_s = machine.output.period_s();
-    let gains = Gains::design(&machine.scanner, tick_s)?;
-    let inverse = Inverse::new(&galvo, &gains, tick_s).ok_or(PlanError::Immovable)?;
     let angles = |place: Point| {
-        angles_from_field(&machine.optics, place.into()).map(|angles| [angles.x_rad, angles.y_rad])
+        angles_from_field(&draft.machine.optics, place.into())
+            .map(|angles| [angles.x_rad, angles.y_rad])
     };
     let around = angles_around(draft, motion, tick, angles)
         .map_err(|place| PlanError::Unreachable { x_mm: place.x, y_mm: place.y })?;

@@ -3,7 +3,7 @@
 use crate::output::Output;
 use crate::{Error, convert, import};
 use ftheta_formats::text::hershey;
-use ftheta_formats::{pattern_file, svg_write};
+use ftheta_formats::{pattern_file, points, svg_write};
 use ftheta_model::job::{Job, Layer, Paint, Shape};
 use ftheta_model::machine::{Laser, Machine};
 use ftheta_model::pattern::{LaserDelays, Pattern};
@@ -113,14 +113,7 @@ impl Sheet {
 
     /// The table that the user fills in.
     fn table(&self) -> String {
-        let mut out =
-            String::from("target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark\n");
-        for (name, place) in &self.places {
-            // A zero has no sign here, however it came about.
-            let (x, y) = (place.x_mm + 0.0, place.y_mm + 0.0);
-            out.push_str(&format!("{x},{y},,,1,{name}\n"));
-        }
-        out
+        points::write(self.places.iter().map(|(name, place)| (name.as_str(), *place, 1, None)))
     }
 }
 
