@@ -10,6 +10,7 @@ pub mod flatten;
 pub mod job;
 pub mod machine;
 pub mod pattern;
+pub mod picture;
 pub mod plan;
 pub mod recipe;
 pub mod space;

@@ -5,6 +5,7 @@
 pub mod along;
 pub mod audit;
 pub mod axis_loop;
+pub mod camera;
 pub mod correction;
 pub mod envelope;
 pub mod focus;
