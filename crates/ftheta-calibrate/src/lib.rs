@@ -6,7 +6,9 @@
 pub mod accuracy;
 pub mod axes;
 pub mod calibrate;
+pub mod delay;
 pub mod error;
+mod levenberg;
 pub mod mark;
 mod physical;
 pub mod sanity;
