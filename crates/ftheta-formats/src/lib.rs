@@ -12,6 +12,7 @@ pub mod machine;
 pub mod mechanism;
 pub mod motion_law;
 pub mod pattern_file;
+pub mod picture_file;
 pub mod plan_file;
 pub mod points;
 pub mod recipe;

@@ -14,6 +14,7 @@ pub mod picture;
 pub mod plan;
 pub mod recipe;
 pub mod space;
+pub mod tag;
 pub mod toolpath;
 pub mod trace;
 pub mod warning;

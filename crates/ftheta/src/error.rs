@@ -8,6 +8,7 @@ use ftheta_formats::cor_file::CorFileError;
 use ftheta_formats::correction_file::CorrectionFileError;
 use ftheta_formats::motion_law::MotionLawError;
 use ftheta_formats::pattern_file::PatternFileError;
+use ftheta_formats::picture_file::PictureFileError;
 use ftheta_formats::plan_file::PlanFileError;
 use ftheta_formats::svg::error::SvgError;
 use ftheta_formats::text_table::error::TableError;
@@ -147,6 +148,14 @@ pub enum Error {
         /// What is wrong.
         source: PatternFileError,
     },
+    /// A file gives no picture.
+    #[error("{path}: {source}", path = path.display())]
+    PictureFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: PictureFileError,
+    },
     /// A plan file is at fault.
     #[error("{path}: {source}", path = path.display())]
     PlanFile {
@@ -250,6 +259,7 @@ impl Error {
             }
             Self::Field { path, source } => in_file(path, source.fault()),
             Self::PatternFile { path, source } => in_file(path, source.fault()),
+            Self::PictureFile { path, source } => in_file(path, source.fault()),
             Self::PlanFile { path, source } => in_file(path, source.fault()),
             Self::PlanId { path, found, claimed } => {
                 (path.display().to_string(), found.clone(), claimed.clone())

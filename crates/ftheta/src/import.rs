@@ -1,6 +1,7 @@
-//! Reads drawings, recipes, patterns and measured points from files.
+//! Reads drawings, recipes, patterns, pictures and measured points from files.
 
 use crate::Error;
+use ftheta_formats::picture_file::{self, PictureRead};
 use ftheta_formats::{pattern_file, recipe, svg};
 use ftheta_model::calibration::MeasuredPoint;
 use ftheta_model::job::Job;
@@ -94,4 +95,13 @@ pub fn measured_points(
 pub fn pattern(path: &Path) -> Result<Pattern, Error> {
     pattern_file::read(&bytes(path)?)
         .map_err(|source| Error::PatternFile { path: path.into(), source })
+}
+
+/// The picture of a PNG, JPEG or TIFF file.
+///
+/// # Errors
+/// If the file cannot be read, or is no picture or not a whole one.
+pub fn picture(path: &Path) -> Result<PictureRead, Error> {
+    picture_file::read(&bytes(path)?)
+        .map_err(|source| Error::PictureFile { path: path.into(), source })
 }
