@@ -9,6 +9,7 @@ mod layout;
 pub mod measured;
 mod placement;
 mod profile;
+mod rectangle;
 mod regression;
 mod strokes;
 mod view;
@@ -16,18 +17,22 @@ mod view;
 use error::DelayError;
 use ftheta_model::pattern::Pattern;
 use ftheta_model::picture::{Picture, PixelPoint};
-use growth::{Growth, SpeedWidth, growth};
+use growth::{Growth, Look, SpeedWidth, growth};
 use layout::{Layout, RowProcess};
-use measured::{Reject, Scene, SeenLine};
+use measured::{ROWS_WIDTHS, Reject, Scene, SeenLine};
 use regression::{LineEnd, Regression, WRONG_SHARE, regress};
 
 /// Fewest lines each way, and speeds.
 const N_LINES_MIN: usize = 2;
 const N_SPEEDS_MIN: usize = 2;
+/// Differences of widths below this are noise, px.
+const WIDTH_PX: f64 = 0.12;
+/// Blur by the softness of tips: their roundness adds to it.
+const TIP_BLUR: f64 = 0.9;
 /// Greatest softness of edges by the distance of rows.
 const BLUR: f64 = 0.2;
 /// Greatest deviation of rows from where the view has them, px rms.
-const BENT_PX: f64 = 0.5;
+const BENT_PX: f64 = 1.0;
 /// Share of the ends that may lie on cut-off white, percent.
 const SATURATED_PERCENT: f64 = 10.0;
 /// Greatest deviation of a delay, µs: beyond it no number is given; and beyond which it is said.
@@ -35,9 +40,30 @@ const UNCERTAIN_US: f64 = 5.0;
 /// Lines of the same speed: to this part.
 const SAME_SPEED: f64 = 1e-3;
 
+/// How delays are drawn from a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Lines both ways at several speeds; nothing about spot or dose has to be known.
+    Comb,
+    /// Gaps between the lines of one speed and the sides of a rectangle, as the patent has it. The
+    /// mean of both delays is as good as a comb's, their difference hangs on how far ends grow.
+    Rectangle,
+}
+
+/// What is known beside picture and pattern.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DelayOptions {
+    /// Method; `None` takes the comb's from two speeds on.
+    pub method: Option<Method>,
+    /// 1/e² radius of the spot, mm, for the rectangle.
+    pub spot_radius_mm: Option<f64>,
+}
+
 /// Delays as a picture shows them.
 #[derive(Clone, Debug)]
 pub struct Delays {
+    /// How they were found.
+    pub method: Method,
     /// Lateness of the start and of the stop, s; positive is late.
     pub tau_on_s: f64,
     /// See there.
@@ -52,6 +78,9 @@ pub struct Delays {
     pub growth_mm: f64,
     /// Deviation of the ends from the regression, mm.
     pub rms_mm: f64,
+    /// What the patent's formula makes of start and stop, s: measured from the outer edge of a
+    /// side to the visible end. It is off by (half a width - growth) / speed.
+    pub patent_s: Option<[f64; 2]>,
     /// Every line of the pattern.
     pub lines: Vec<Line>,
     /// Widths of the lines by speed.
@@ -110,47 +139,42 @@ pub struct LineEndSeen {
     pub reject: Option<Reject>,
 }
 
-/// Delays from a picture of a comb.
+/// Delays from a picture of a pattern.
 ///
 /// # Errors
 /// If the picture does not show the pattern, or not well enough.
-pub fn estimate(picture: &Picture, pattern: &Pattern) -> Result<Delays, DelayError> {
+pub fn estimate(
+    picture: &Picture,
+    pattern: &Pattern,
+    options: &DelayOptions,
+) -> Result<Delays, DelayError> {
     let layout = Layout::new(pattern)?;
-    let speeds = speeds(&layout)?;
-    let strokes = strokes::strokes(picture)?;
-    let placement = placement::place(&layout, &strokes)?;
-    let view = view::fit_view(picture, strokes.bright, &layout, &placement)
-        .filter(|view| view.rms_px < BENT_PX || view.rms_px.is_nan());
-    let Some(view) = view else {
-        let fitted = view::fit_view(picture, strokes.bright, &layout, &placement);
-        let rms_px = fitted.map_or(f64::NAN, |view| view.rms_px);
-        return Err(DelayError::Bent { rms_px, limit_px: BENT_PX });
-    };
-    let mut widths: Vec<f64> = placement.rows.iter().map(|row| row.width_px).collect();
-    let middle = widths.len() / 2;
-    let width_px = *widths.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let (bright, contrast) = (strokes.bright, strokes.contrast);
-    let scene = Scene { picture, bright, contrast, layout: &layout, view: &view };
-    let mut seen: Vec<SeenLine> = Vec::new();
-    for (index, row) in layout.rows.iter().enumerate().filter(|(_, row)| row.process.is_some()) {
-        let located = placement.rows.iter().find(|located| located.row == index);
-        let nothing = SeenLine { row: index, ends: [Err(Reject::NotFound); 2], profile: vec![] };
-        debug_assert!(row.process.is_some());
-        seen.push(located.map_or(nothing, |located| scene.measure(located, width_px)));
+    let speeds = speeds(&layout);
+    match options.method.unwrap_or(if speeds.len() > 1 { Method::Comb } else { Method::Rectangle })
+    {
+        Method::Comb => comb(picture, &layout, &speeds),
+        Method::Rectangle => {
+            rectangle::rectangle(picture, &layout, &speeds, options.spot_radius_mm)
+        }
     }
-    let blur_px = gate(&seen, layout.pitch_mm() / view.mm_per_px)?;
-    let widths = widths_by_speed(&layout, &seen, &speeds, bright, view.mm_per_px);
-    let growth = growth(&widths);
-    let ends = line_ends(&layout, &seen, &speeds);
+}
+
+fn comb(picture: &Picture, layout: &Layout, speeds: &[f64]) -> Result<Delays, DelayError> {
+    enough(layout, speeds)?;
+    let observed = Observed::new(picture, layout)?;
+    let widths = observed.widths_by_speed(layout, speeds);
+    let growth = growth(&widths, WIDTH_PX * observed.facts.mm_per_px, &observed.look());
+    let ends = observed.line_ends(layout, speeds);
     let regression = regress(&ends, &growth)
         .ok_or(DelayError::Uncertain { sd_us: f64::INFINITY, limit_us: UNCERTAIN_US })?;
-    let lines = lines(&layout, &seen, &ends, &regression);
+    let lines = lines(layout, &observed.lines, &ends, &regression);
     judge(&lines, &regression)?;
     // The scale's error is one of all lines together.
-    let scaled = |sd: f64, tau: f64| sd.hypot(view.scale_sd * tau);
+    let scaled = |sd: f64, tau: f64| sd.hypot(observed.facts.scale_sd * tau);
     let [on_sd, off_sd, mean_sd] = regression.sd_s;
     let (on, off) = (regression.tau_on_s, regression.tau_off_s);
     Ok(Delays {
+        method: Method::Comb,
         tau_on_s: on,
         tau_off_s: off,
         sd_s: [scaled(on_sd, on), scaled(off_sd, off), scaled(mean_sd, 0.5 * (on + off))],
@@ -158,9 +182,46 @@ pub fn estimate(picture: &Picture, pattern: &Pattern) -> Result<Delays, DelayErr
         growth,
         growth_mm: regression.growth_mm,
         rms_mm: regression.rms_mm,
+        patent_s: None,
         lines,
         widths,
-        scene: SceneFacts {
+        scene: observed.facts,
+    })
+}
+
+/// The pattern as it was found in a picture.
+struct Observed {
+    lines: Vec<SeenLine>,
+    /// Coarse width of all lines, px.
+    width_px: f64,
+    facts: SceneFacts,
+}
+
+impl Observed {
+    fn new(picture: &Picture, layout: &Layout) -> Result<Self, DelayError> {
+        let strokes = strokes::strokes(picture)?;
+        let placement = placement::place(layout, &strokes)?;
+        let view = view::fit_view(picture, strokes.bright, layout, &placement);
+        let rms_px = view.as_ref().map_or(f64::NAN, |view| view.rms_px);
+        let view = view.filter(|view| view.rms_px < BENT_PX);
+        let view = view.ok_or(DelayError::Bent { rms_px, limit_px: BENT_PX })?;
+        let mut widths: Vec<f64> = placement.rows.iter().map(|row| row.width_px).collect();
+        let middle = widths.len() / 2;
+        let width_px = *widths.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let (bright, contrast) = (strokes.bright, strokes.contrast);
+        let scene = Scene { picture, bright, contrast, layout, view: &view };
+        let marked = layout.rows.iter().enumerate().filter(|(_, row)| row.process.is_some());
+        let lines: Vec<SeenLine> = marked
+            .map(|(index, _)| {
+                let located = placement.rows.iter().find(|located| located.row == index);
+                match located {
+                    Some(located) => scene.measure(located, width_px),
+                    None => SeenLine::nothing(index, Reject::NotFound),
+                }
+            })
+            .collect();
+        let blur_px = gate(&lines, layout.pitch_mm() / view.mm_per_px)?;
+        let facts = SceneFacts {
             bright,
             contrast,
             noise: strokes.noise,
@@ -170,12 +231,82 @@ pub fn estimate(picture: &Picture, pattern: &Pattern) -> Result<Delays, DelayErr
             view_rms_px: view.rms_px,
             references: view.columns,
             upside_down: placement.upside_down,
-        },
-    })
+        };
+        Ok(Self { lines, width_px, facts })
+    }
+
+    /// How ends were looked at.
+    fn look(&self) -> Look {
+        let SceneFacts { mm_per_px, blur_px, .. } = self.facts;
+        Look {
+            blur_mm: TIP_BLUR * blur_px * mm_per_px,
+            rows_mm: ROWS_WIDTHS * self.width_px * mm_per_px,
+        }
+    }
+
+    /// Mean width of the lines of each speed; empty if they cannot be told.
+    fn widths_by_speed(&self, layout: &Layout, speeds: &[f64]) -> Vec<SpeedWidth> {
+        let mut profiles: Vec<(Vec<f64>, f64, f64)> = vec![(Vec::new(), 0.0, 0.0); speeds.len()];
+        for line in self.lines.iter().filter(|line| !line.profile.is_empty()) {
+            let Some(process) = layout.rows[line.row].process else { continue };
+            let (sum, n, power) = &mut profiles[speed_index(speeds, process)];
+            sum.resize(line.profile.len(), 0.0);
+            sum.iter_mut().zip(&line.profile).for_each(|(sum, value)| *sum += value);
+            (*n, *power) = (*n + 1.0, *power + process.power_ratio);
+        }
+        if profiles.iter().any(|(_, n, _)| *n == 0.0) {
+            return Vec::new();
+        }
+        let means: Vec<Vec<f64>> = profiles
+            .iter()
+            .map(|(sum, n, _)| sum.iter().map(|value| value / n).collect())
+            .collect();
+        let Some((widths_px, _)) = profile::widths_px(&means, self.facts.bright) else {
+            return Vec::new();
+        };
+        let all = speeds.iter().zip(&profiles).zip(widths_px);
+        all.map(|((&speed_mm_s, (_, n, power)), width_px)| SpeedWidth {
+            speed_mm_s,
+            power_ratio: power / n,
+            width_mm: width_px * self.facts.mm_per_px,
+        })
+        .collect()
+    }
+
+    fn line_ends(&self, layout: &Layout, speeds: &[f64]) -> Vec<LineEnd> {
+        let mut ends = Vec::new();
+        for (index, line) in self.lines.iter().enumerate() {
+            let row = &layout.rows[line.row];
+            let Some(process) = row.process else { continue };
+            for (end, nominal_mm, on) in
+                [(line.ends[0], row.ends_mm[0], true), (line.ends[1], row.ends_mm[1], false)]
+            {
+                ends.extend(end.ok().map(|end| LineEnd {
+                    row: index,
+                    speed: speed_index(speeds, process),
+                    speed_mm_s: process.speed_mm_s,
+                    sense: row.sense(),
+                    on,
+                    off_mm: end.along_mm - nominal_mm,
+                    across_mm: row.across_mm,
+                }));
+            }
+        }
+        ends
+    }
 }
 
-/// The pattern's speeds, mm/s, rising; checks that there are enough lines of them.
-fn speeds(layout: &Layout) -> Result<Vec<f64>, DelayError> {
+/// The pattern's speeds, mm/s, rising.
+fn speeds(layout: &Layout) -> Vec<f64> {
+    let processes = layout.rows.iter().filter_map(|row| row.process);
+    let mut speeds: Vec<f64> = processes.map(|process| process.speed_mm_s).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup_by(|b, a| *b - *a < SAME_SPEED * *b);
+    speeds
+}
+
+/// Checks that there are lines enough both ways, and speeds.
+fn enough(layout: &Layout, speeds: &[f64]) -> Result<(), DelayError> {
     let of = |sense: f64| {
         layout.rows.iter().filter(move |row| row.process.is_some() && row.sense() == sense)
     };
@@ -185,15 +316,11 @@ fn speeds(layout: &Layout) -> Result<Vec<f64>, DelayError> {
             return Err(DelayError::Pattern { what, found, limit: N_LINES_MIN });
         }
     }
-    let processes = layout.rows.iter().filter_map(|row| row.process);
-    let mut speeds: Vec<f64> = processes.map(|process| process.speed_mm_s).collect();
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup_by(|b, a| *b - *a < SAME_SPEED * *b);
     match speeds.len() {
         found @ 0..N_SPEEDS_MIN => {
             Err(DelayError::Pattern { what: "speeds", found, limit: N_SPEEDS_MIN })
         }
-        _ => Ok(speeds),
+        _ => Ok(()),
     }
 }
 
@@ -221,59 +348,6 @@ fn gate(seen: &[SeenLine], pitch_px: f64) -> Result<f64, DelayError> {
         return Err(DelayError::Blurred { blur_px, pitch_px, limit_px });
     }
     Ok(blur_px)
-}
-
-/// Mean width of the lines of each speed; empty if they cannot be told.
-fn widths_by_speed(
-    layout: &Layout,
-    seen: &[SeenLine],
-    speeds: &[f64],
-    bright: bool,
-    mm_per_px: f64,
-) -> Vec<SpeedWidth> {
-    let mut profiles: Vec<(Vec<f64>, f64, f64)> = vec![(Vec::new(), 0.0, 0.0); speeds.len()];
-    for line in seen.iter().filter(|line| !line.profile.is_empty()) {
-        let Some(process) = layout.rows[line.row].process else { continue };
-        let (sum, n, power) = &mut profiles[speed_index(speeds, process)];
-        sum.resize(line.profile.len(), 0.0);
-        sum.iter_mut().zip(&line.profile).for_each(|(sum, value)| *sum += value);
-        (*n, *power) = (*n + 1.0, *power + process.power_ratio);
-    }
-    if profiles.iter().any(|(_, n, _)| *n == 0.0) {
-        return Vec::new();
-    }
-    let means: Vec<Vec<f64>> =
-        profiles.iter().map(|(sum, n, _)| sum.iter().map(|value| value / n).collect()).collect();
-    let Some((widths_px, _)) = profile::widths_px(&means, bright) else { return Vec::new() };
-    let all = speeds.iter().zip(&profiles).zip(widths_px);
-    all.map(|((&speed_mm_s, (_, n, power)), width_px)| SpeedWidth {
-        speed_mm_s,
-        power_ratio: power / n,
-        width_mm: width_px * mm_per_px,
-    })
-    .collect()
-}
-
-fn line_ends(layout: &Layout, seen: &[SeenLine], speeds: &[f64]) -> Vec<LineEnd> {
-    let mut ends = Vec::new();
-    for (index, line) in seen.iter().enumerate() {
-        let row = &layout.rows[line.row];
-        let Some(process) = row.process else { continue };
-        for (end, nominal_mm, on) in
-            [(line.ends[0], row.ends_mm[0], true), (line.ends[1], row.ends_mm[1], false)]
-        {
-            ends.extend(end.ok().map(|end| LineEnd {
-                row: index,
-                speed: speed_index(speeds, process),
-                speed_mm_s: process.speed_mm_s,
-                sense: row.sense(),
-                on,
-                off_mm: end.along_mm - nominal_mm,
-                across_mm: row.across_mm,
-            }));
-        }
-    }
-    ends
 }
 
 fn lines(

@@ -104,9 +104,9 @@ pub struct Mark {
     /// Greatest distance of the beam from a mark, µm.
     #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
     pub tolerance_um: f64,
-    /// Order of the marks: short jumps, or as drawn.
-    #[arg(long, value_enum, default_value = "shortest")]
-    pub order: OrderName,
+    /// Order of the marks: short jumps, or as drawn; what the recipe says, else shortest.
+    #[arg(long, value_enum)]
+    pub order: Option<OrderName>,
     /// Scale the page so that its longest side is this long, mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub fit: Option<f64>,

@@ -13,9 +13,12 @@ pub fn read(file: &str, text: &str) -> Result<Recipe, TomlError> {
     parse(file, text, |root| {
         let styles = [("outline", TextStyle::Outline), ("single-stroke", TextStyle::SingleStroke)];
         let text = root.section("text", |section| section.choice("style", &styles))?;
+        let orders = [("shortest", false), ("keep", true)];
+        let keep_order = root.choice("order", &orders)?.unwrap_or(false);
         let flatten = root.number("flatten_tolerance_um", 0.01..=1000.0)?;
         Ok(Recipe {
             pens: root.sections("pen", pen)?,
+            keep_order,
             classic: root.section("classic", classic)?.unwrap_or_default(),
             text: text.flatten().unwrap_or_default(),
             flatten_tolerance_mm: flatten.map(|um| um * 1e-3),

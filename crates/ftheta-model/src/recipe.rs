@@ -43,6 +43,8 @@ pub struct Recipe {
     /// The first rule that matches a shape gives its pen. A shape that none matches gets a
     /// default pen named after its colour.
     pub pens: Vec<PenRule>,
+    /// Whether marks keep the drawing's order and directions, where they matter more than time.
+    pub keep_order: bool,
     /// Settings of the classic planner; what is `None` is derived from the machine.
     pub classic: ClassicRecipe,
     /// How text is marked.

@@ -41,8 +41,8 @@ pub struct MarkOptions {
     pub atlas_store: AtlasStore,
     /// Greatest distance of the beam from a mark, mm.
     pub tolerance_mm: f64,
-    /// Order of the marks.
-    pub order: Order,
+    /// Order of the marks; the recipe's if `None`.
+    pub order: Option<Order>,
     /// Marks what fits of shapes that leave the field.
     pub clip: bool,
     /// How the twin's plant differs from the machine.
@@ -61,7 +61,7 @@ pub struct MarkOptions {
 pub const RESERVE: f64 = 0.12;
 
 impl Default for MarkOptions {
-    /// Pens' own speed, the best planner, 12 % reserve, no store, 10 µm, shortest order, no
+    /// Pens' own speed, the best planner, 12 % reserve, no store, 10 µm, the recipe's order, no
     /// clipping, no mismatch, no noise, seed 1, a perfect head without a table.
     fn default() -> Self {
         Self {
@@ -71,7 +71,7 @@ impl Default for MarkOptions {
             reserve: RESERVE,
             atlas_store: AtlasStore::none(),
             tolerance_mm: 0.010,
-            order: Order::Shortest,
+            order: None,
             clip: false,
             mismatch: Mismatch::default(),
             noise_mm: 0.0,
@@ -191,9 +191,10 @@ pub(crate) fn lay_out(
     recipe: &Recipe,
     options: &MarkOptions,
 ) -> Result<Imported<Toolpath>, Error> {
+    let of_recipe = if recipe.keep_order { Order::Keep } else { Order::Shortest };
     let lay_options = LayOptions {
         flatten_tolerance_mm: recipe.flatten_tolerance_mm.unwrap_or(0.002),
-        order: options.order,
+        order: options.order.unwrap_or(of_recipe),
         half_field_mm: 0.5 * machine.optics.field_mm,
         clip: options.clip,
         ..LayOptions::default()

@@ -1,5 +1,6 @@
 //! Patterns to calibrate or judge a head by, each with the nominal places of its features.
 
+pub mod delay;
 pub mod error;
 pub mod grid;
 pub mod ilda;

@@ -83,7 +83,7 @@ pub fn measure(
     let (strokes, sights) = strokes(pattern);
     let recipe = Recipe::default();
     let mark_options = MarkOptions {
-        order: Order::Keep,
+        order: Some(Order::Keep),
         planner: options.planner,
         atlas_store: options.atlas_store.clone(),
         seed: options.seed,

@@ -106,7 +106,7 @@ fn marks_that_all_but_touch_are_joined() {
     let recipe = at_speed(1000.0, ClassicRecipe::default());
     let elements = r#"<path d="M10 10 h5"/><path d="M15.0000003 10 h5"/>"#;
     let job = drawing(elements, &recipe);
-    let options = MarkOptions { order: Order::Keep, ..classic() };
+    let options = MarkOptions { order: Some(Order::Keep), ..classic() };
     let marked = mark(&job, &preset("S10"), &recipe, &options, &mut |_| {}).unwrap();
     assert_eq!((marked.plan.marks.len(), marked.times.n_jumps), (2, 0));
 }
@@ -199,7 +199,7 @@ fn frame_of_the_field_is_within_the_limits() {
         );
         let recipe = at_speed(3000.0, ClassicRecipe::default());
         let job = svg::read(text.as_bytes(), &recipe, &svg::SvgOptions::default()).unwrap().value;
-        let options = MarkOptions { order: Order::Keep, ..classic() };
+        let options = MarkOptions { order: Some(Order::Keep), ..classic() };
         let marked = mark(&job, &machine, &recipe, &options, &mut |_| {});
         assert!(marked.is_ok(), "{name}: {:?}", marked.err());
     }
@@ -249,7 +249,7 @@ proptest! {
         let recipe = at_speed(mark_speed_mm_s, ClassicRecipe::default());
         let job = drawing(&elements, &recipe);
         let options = MarkOptions {
-            order: if keep { Order::Keep } else { Order::Shortest },
+            order: keep.then_some(Order::Keep),
             mismatch: Mismatch { f1, kt, zeta: None },
             ..classic()
         };

@@ -44,7 +44,7 @@ fn run(machine: &Machine, planner: Option<Planner>) -> Result<Marked, Error> {
     static FOLDER: LazyLock<TempDir> = LazyLock::new(|| tempfile::tempdir().unwrap());
     let atlas_store = AtlasStore::new(Some(FOLDER.path().into()));
     let options =
-        MarkOptions { planner, order: Order::Keep, atlas_store, ..MarkOptions::default() };
+        MarkOptions { planner, order: Some(Order::Keep), atlas_store, ..MarkOptions::default() };
     mark(&job, machine, &recipe, &options, &mut |_| {})
 }
 

@@ -25,7 +25,7 @@ fn run(elements: &str, machine: &str, speed_mm_s: f64, tolerance_mm: f64) -> Mar
         planner: Some(Planner::Optimal),
         speed_mm_s: Some(speed_mm_s),
         tolerance_mm,
-        order: Order::Keep,
+        order: Some(Order::Keep),
         atlas_store: AtlasStore::new(Some(FOLDER.path().into())),
         ..MarkOptions::default()
     };

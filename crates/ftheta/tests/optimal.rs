@@ -264,7 +264,7 @@ fn the_audit_refuses_motion_that_is_not_what_it_says() {
 
 fn stored(folder: &Path) -> MarkOptions {
     let atlas_store = AtlasStore::new(Some(folder.into()));
-    MarkOptions { order: Order::Keep, atlas_store, ..MarkOptions::default() }
+    MarkOptions { order: Some(Order::Keep), atlas_store, ..MarkOptions::default() }
 }
 
 /// The atlas and the solved programs, and nothing half-written.

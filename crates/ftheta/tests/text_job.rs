@@ -24,7 +24,7 @@ fn run(machine: &Machine, speed_mm_s: f64, corner: Corner, mismatch: Mismatch) -
         speed_mm_s: Some(speed_mm_s),
         corner,
         mismatch,
-        order: Order::Keep,
+        order: Some(Order::Keep),
         atlas_store: AtlasStore::new(Some(FOLDER.path().into())),
         ..MarkOptions::default()
     };

@@ -177,18 +177,23 @@ pub enum DelayError {
     },
     /// Gaps that do not show.
     #[error(
-        "no gap shows at the {end} of the lines (it would be {gap_um:.0} µm, the limit is \
-         {limit_um:.0} µm): {advice}, or mark faster"
+        "{n_free} of {n_ends} line ends stand free of the rectangle's sides, all have to: mark \
+         again with light switched on later and off earlier (--preset-us), or faster"
     )]
     NoGap {
-        /// start or end.
-        end: &'static str,
-        /// Width of the gap, µm.
-        gap_um: f64,
-        /// Least width, µm.
-        limit_um: f64,
-        /// What to change.
-        advice: &'static str,
+        /// Ends that stand free.
+        n_free: usize,
+        /// Ends of lines.
+        n_ends: usize,
+    },
+    /// A rectangle without its sides.
+    #[error(
+        "{n_sides} lines across its rows were burned in the pattern, a rectangle has at least 2: \
+         use --method comb, or the .json that `ftheta pattern delay --method rectangle` wrote"
+    )]
+    NoSides {
+        /// References across the rows.
+        n_sides: usize,
     },
 }
 
@@ -199,7 +204,9 @@ impl DelayError {
             Self::NoContrast { contrast, limit, .. } => {
                 ("contrast", format!("{contrast:.3}"), format!("{limit:.3}"))
             }
-            Self::Clutter { n_pieces, limit } => ("pieces", n_pieces.to_string(), limit.to_string()),
+            Self::Clutter { n_pieces, limit } => {
+                ("pieces", n_pieces.to_string(), limit.to_string())
+            }
             Self::NoLines { kind } => ("pattern kind", kind.clone(), "lines".into()),
             Self::NotParallel { id } => ("pattern line", id.clone(), "parallel".into()),
             Self::OnTop { ids } => ("pattern lines", ids.join(", "), "apart".into()),
@@ -234,9 +241,8 @@ impl DelayError {
             Self::Uncertain { sd_us, limit_us } => {
                 ("deviation, µs", format!("{sd_us:.1}"), format!("{limit_us:.1}"))
             }
-            Self::NoGap { gap_um, limit_um, .. } => {
-                ("gap, µm", format!("{gap_um:.0}"), format!("{limit_um:.0}"))
-            }
+            Self::NoGap { n_free, n_ends } => ("free ends", n_free.to_string(), n_ends.to_string()),
+            Self::NoSides { n_sides } => ("pattern sides", n_sides.to_string(), "2".into()),
         }
     }
 }

@@ -13,7 +13,10 @@ const WINDOW_WIDTHS: f64 = 2.0;
 const WINDOW_PX: f64 = 4.0;
 const WINDOW_LENGTH: f64 = 0.25;
 /// Half of the rows that are averaged at an end, by the line's width.
-const ROWS_WIDTHS: f64 = 0.35;
+pub const ROWS_WIDTHS: f64 = 0.35;
+/// An end lies no farther beyond the coarse one, and a line breaks for no longer, in widths.
+const END_WITHIN_WIDTHS: f64 = 8.0;
+const BREAK_WIDTHS: f64 = 2.5;
 /// A line stands out by this part of the picture's contrast.
 const CONTRAST: f64 = 0.3;
 /// Brightness that counts as cut off.
@@ -85,31 +88,75 @@ pub struct Scene<'a> {
     pub view: &'a FittedView,
 }
 
+impl SeenLine {
+    /// A line of which nothing was seen.
+    pub fn nothing(row: usize, reject: Reject) -> Self {
+        Self { row, ends: [Err(reject); 2], profile: Vec::new() }
+    }
+}
+
 impl Scene<'_> {
     /// Measures a line.
     ///
     /// * `width_px`: of all lines
     pub fn measure(&self, located: &Located, width_px: f64) -> SeenLine {
         let row = &self.layout.rows[located.row];
-        let nothing = |reject| SeenLine { row: located.row, ends: [Err(reject); 2], profile: vec![] };
         let pitch_px = self.layout.pitch_mm() / self.view.mm_per_px;
         let reach_px = (2.5 * width_px + 2.0).min(0.45 * pitch_px);
         let Some((from, direction)) = self.middle_line(located, width_px, reach_px) else {
-            return nothing(Reject::NotFound);
+            return SeenLine::nothing(located.row, Reject::NotFound);
         };
         let length_px = located.ends[0].distance(located.ends[1]);
-        let at = |t: f64| PixelPoint::new(from.x_px + t * direction[0], from.y_px + t * direction[1]);
+        let at =
+            |t: f64| PixelPoint::new(from.x_px + t * direction[0], from.y_px + t * direction[1]);
         let window_px = (WINDOW_WIDTHS * width_px + WINDOW_PX).min(WINDOW_LENGTH * length_px);
-        let low = self.end(at(0.0), direction.map(|d| -d), [window_px, width_px]);
-        let high = self.end(at(length_px), direction, [window_px, width_px]);
-        let ends = if row.sense() > 0.0 { [low, high] } else { [high, low] };
-        let strip = Strip {
-            middle: at(0.5 * length_px),
-            direction,
-            half_length_px: 0.35 * length_px,
-            reach_px,
-        };
-        SeenLine { row: located.row, ends, profile: strip.across(self.picture) }
+        let middle = at(0.5 * length_px);
+        let strip = Strip { middle, direction, half_length_px: 0.35 * length_px, reach_px };
+        let profile = strip.across(self.picture);
+        let ground = 0.5 * (profile[0] + profile[profile.len() - 1]);
+        let line = profile[profile.len() / 2];
+        let most_px = 0.5 * length_px + END_WITHIN_WIDTHS * width_px;
+        let mut both = [direction.map(|d| -d), direction].map(|outward| {
+            let end = self.walk(middle, outward, [0.5 * (ground + line), most_px], width_px);
+            self.end(end, outward, [window_px, width_px])
+        });
+        if row.sense() < 0.0 {
+            both.reverse();
+        }
+        SeenLine { row: located.row, ends: both, profile }
+    }
+
+    /// Where a line ends, to a pixel, walking outward on its middle.
+    ///
+    /// * `half`: brightness between line and ground
+    /// * `most_px`: how far to walk
+    fn walk(
+        &self,
+        middle: PixelPoint,
+        outward: [f64; 2],
+        [half, most_px]: [f64; 2],
+        width_px: f64,
+    ) -> PixelPoint {
+        let at =
+            |t: f64| PixelPoint::new(middle.x_px + t * outward[0], middle.y_px + t * outward[1]);
+        let mut end = 0.0;
+        for step in 0..most_px as i32 {
+            let t = f64::from(step);
+            // Three pixels across, so that a speck does not end the line, nor go on for it.
+            let across = [-1.0, 0.0, 1.0].map(|off| {
+                let place = at(t);
+                let place =
+                    PixelPoint::new(place.x_px - off * outward[1], place.y_px + off * outward[0]);
+                f64::from(self.picture.at(place))
+            });
+            let mean = across.iter().sum::<f64>() / 3.0;
+            if (mean > half) == self.bright {
+                end = t;
+            } else if t > end + BREAK_WIDTHS * width_px {
+                break;
+            }
+        }
+        at(end)
     }
 
     /// Where the middle of a line runs: the place beside its first coarse end, and its direction.
@@ -163,7 +210,8 @@ impl Scene<'_> {
         }
         let edge = found.ok_or(Reject::NoEdge)?;
         let sign = if self.bright { 1.0 } else { -1.0 };
-        if !self.picture.contains(here) || sign * (edge.line - edge.ground) < CONTRAST * self.contrast
+        if !self.picture.contains(here)
+            || sign * (edge.line - edge.ground) < CONTRAST * self.contrast
         {
             return Err(Reject::NoEdge);
         }

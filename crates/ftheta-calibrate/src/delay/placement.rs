@@ -20,12 +20,16 @@ const N_BEGIN: usize = 8;
 const FOUND_SHARE: f64 = 0.8;
 /// Strokes along the lines beyond the pattern's, as a share of them, that are not another pattern.
 const EXTRA_SHARE: f64 = 0.25;
+/// Pieces of a line are no farther apart than this part of the longer one.
+const GAP: f64 = 0.25;
 /// Columns have to span this part of the rows' extent.
 const COLUMN_LENGTH: f64 = 0.6;
 /// Columns agree with the pattern's to this part of their distance, before perspective is known.
 const COLUMN_GATE: f64 = 0.06;
 /// The right way to lay the pattern on the picture is better than any other by this factor.
 const CLEARLY: f64 = 2.0;
+/// Ways that leave up to so many times the least are about as good.
+const ABOUT: f64 = 1.5;
 /// What coarse ends leave at least, px: differences below it mean nothing.
 const COARSE_PX: f64 = 1.0;
 
@@ -97,7 +101,20 @@ struct Hypothesis {
 /// # Errors
 /// If it is not there, not as a whole, twice, or mirrored.
 pub fn place(layout: &Layout, strokes: &Strokes) -> Result<Placement, DelayError> {
-    let frame = Frame::new(&strokes.list, layout)?;
+    let direction = main_direction(&strokes.list, layout)?;
+    // A rectangle has about as many strokes along as across.
+    let along = place_along(layout, &strokes.list, direction);
+    along.or_else(|error| {
+        place_along(layout, &strokes.list, direction + FRAC_PI_2).map_err(|_| error)
+    })
+}
+
+fn place_along(
+    layout: &Layout,
+    strokes: &[Stroke],
+    direction: f64,
+) -> Result<Placement, DelayError> {
+    let frame = Frame::new(strokes, direction);
     let n_lines = layout.rows.len();
     let limit = (FOUND_SHARE * n_lines as f64).ceil() as usize;
     let columns = !layout.columns_mm.is_empty() && frame.columns.len() == layout.columns_mm.len();
@@ -126,7 +143,10 @@ pub fn place(layout: &Layout, strokes: &Strokes) -> Result<Placement, DelayError
     if let Some(second) = hypotheses.get(1) {
         let (least, other) = (best.left_px.max(COARSE_PX), second.left_px.max(COARSE_PX));
         if other < CLEARLY * least {
-            return Err(DelayError::Orientation { first_px: best.left_px, second_px: second.left_px });
+            return Err(DelayError::Orientation {
+                first_px: best.left_px,
+                second_px: second.left_px,
+            });
         }
     }
     if best.mirrored {
@@ -140,28 +160,34 @@ fn between(a: f64, b: f64) -> f64 {
     (a - b + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2
 }
 
+/// The direction, rad, in which most strokes run.
+fn main_direction(strokes: &[Stroke], layout: &Layout) -> Result<f64, DelayError> {
+    let n_near = |direction: f64| {
+        strokes.iter().filter(|s| between(s.direction_rad, direction).abs() < ALONG_RAD).count()
+    };
+    let n_steps = (PI / DIRECTION_STEP_RAD) as i32;
+    let tried = (0..n_steps).map(|step| f64::from(step) * DIRECTION_STEP_RAD - FRAC_PI_2);
+    // The first of the best, so that the result does not hang on rounding.
+    let best = tried.map(|direction| (n_near(direction), direction));
+    let best = best.fold((0, 0.0), |best, here| if here.0 > best.0 { here } else { best });
+    if best.0 < 2 {
+        return Err(DelayError::LinesMissing {
+            n_found: best.0,
+            n_lines: layout.rows.len(),
+            n_strokes: strokes.len(),
+            limit: (FOUND_SHARE * layout.rows.len() as f64).ceil() as usize,
+        });
+    }
+    Ok(best.1)
+}
+
 impl Frame {
-    fn new(strokes: &[Stroke], layout: &Layout) -> Result<Self, DelayError> {
-        let n_near = |direction: f64| {
-            strokes.iter().filter(|s| between(s.direction_rad, direction).abs() < ALONG_RAD).count()
-        };
-        let n_steps = (PI / DIRECTION_STEP_RAD) as i32;
-        let tried = (0..n_steps).map(|step| f64::from(step) * DIRECTION_STEP_RAD - FRAC_PI_2);
-        // The first of the best, so that the result does not hang on rounding.
-        let best = tried.map(|direction| (n_near(direction), direction));
-        let best = best.fold((0, 0.0), |best, here| if here.0 > best.0 { here } else { best });
-        if best.0 < 2 {
-            return Err(DelayError::LinesMissing {
-                n_found: best.0,
-                n_lines: layout.rows.len(),
-                n_strokes: strokes.len(),
-                limit: (FOUND_SHARE * layout.rows.len() as f64).ceil() as usize,
-            });
-        }
-        let near = strokes.iter().filter(|s| between(s.direction_rad, best.1).abs() < ALONG_RAD);
-        let weighed = near.map(|s| (s.length_px, s.length_px * between(s.direction_rad, best.1)));
+    fn new(strokes: &[Stroke], direction: f64) -> Self {
+        let near = strokes.iter().filter(|s| between(s.direction_rad, direction).abs() < ALONG_RAD);
+        let weighed =
+            near.map(|s| (s.length_px, s.length_px * between(s.direction_rad, direction)));
         let (weight, sum) = weighed.fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
-        let mut direction_rad = best.1 + sum / weight;
+        let mut direction_rad = direction + if weight > 0.0 { sum / weight } else { 0.0 };
         // To the right, as pictures are mostly taken; down where it is steep.
         if direction_rad > FRAC_PI_2 {
             direction_rad -= PI;
@@ -171,12 +197,17 @@ impl Frame {
             let PixelPoint { x_px, y_px } = s.centre;
             let [along, across] = [cos * x_px + sin * y_px, cos * y_px - sin * x_px];
             let half = 0.5 * s.length_px;
-            Found { across_px: across, along_px: [along - half, along + half], width_px: s.width_px }
+            Found {
+                across_px: across,
+                along_px: [along - half, along + half],
+                width_px: s.width_px,
+            }
         };
         let of = |direction: f64, limit: f64| {
             move |s: &&Stroke| between(s.direction_rad, direction).abs() < limit
         };
-        let rows: Vec<_> = strokes.iter().filter(of(direction_rad, ALONG_RAD)).map(turned).collect();
+        let rows: Vec<_> =
+            strokes.iter().filter(of(direction_rad, ALONG_RAD)).map(turned).collect();
         let across = strokes.iter().filter(of(direction_rad + FRAC_PI_2, ACROSS_RAD));
         let columns: Vec<_> = across
             .map(|s| {
@@ -188,10 +219,13 @@ impl Frame {
             })
             .collect();
         let rows = in_rows(rows);
-        let span = rows[rows.len() - 1].across_px - rows[0].across_px;
+        let span = match rows[..] {
+            [first, .., last] => last.across_px - first.across_px,
+            _ => 0.0,
+        };
         let mut columns = in_rows(columns);
         columns.retain(|column| column.length_px() > COLUMN_LENGTH * span);
-        Ok(Self { direction_rad, rows, columns })
+        Self { direction_rad, rows, columns }
     }
 
     /// The pattern laid on the frame one way; `None` if it does not fit.
@@ -214,7 +248,13 @@ impl Frame {
             found.left_px = self.left_px(layout, &found, columns)?;
             Some(found)
         });
-        judged.min_by(|a, b| a.left_px.total_cmp(&b.left_px))
+        let mut judged: Vec<Hypothesis> = judged.collect();
+        let least = judged.iter().map(|found| found.left_px).fold(f64::INFINITY, f64::min);
+        // Fewer lines leave less; among ways that leave about as much, more lines are better.
+        judged.retain(|found| found.left_px <= ABOUT * least.max(COARSE_PX));
+        judged
+            .into_iter()
+            .max_by(|a, b| a.pairs.len().cmp(&b.pairs.len()).then(b.left_px.total_cmp(&a.left_px)))
     }
 
     /// Ways to pair rows of the picture and the pattern in order, each with its scale.
@@ -245,7 +285,8 @@ impl Frame {
                     let nearest = (last_row + 1..n_rows)
                         .take_while(|&index| at_mm(index) < expected_mm + layout.pitch_mm())
                         .min_by(|&a, &b| off_mm(a).total_cmp(&off_mm(b)));
-                    let Some(row) = nearest.filter(|&row| off_mm(row) < ROW_GATE * layout.pitch_mm())
+                    let Some(row) =
+                        nearest.filter(|&row| off_mm(row) < ROW_GATE * layout.pitch_mm())
                     else {
                         continue;
                     };
@@ -304,8 +345,16 @@ impl Frame {
             for (found, known) in found.iter().zip(&layout.columns_mm) {
                 // Columns do not lie, so they weigh as much as all lines together.
                 let weight = (rows.len() as f64).sqrt();
-                let share = 0.5 * (layout.rows[0].across_mm + layout.rows[layout.rows.len() - 1].across_mm);
-                rows.push([weight, weight * share, 0.0, 0.0, 0.0, weight * (known - 0.5 * (first + last))]);
+                let share =
+                    0.5 * (layout.rows[0].across_mm + layout.rows[layout.rows.len() - 1].across_mm);
+                rows.push([
+                    weight,
+                    weight * share,
+                    0.0,
+                    0.0,
+                    0.0,
+                    weight * (known - 0.5 * (first + last)),
+                ]);
                 values.push(weight * (found - known));
             }
         }
@@ -371,13 +420,21 @@ fn in_rows(mut found: Vec<Found>) -> Vec<Found> {
         if let Some(row) = rows.last_mut()
             && piece.across_px - row.across_px < row.width_px.max(piece.width_px)
         {
-            if piece.length_px() > row.length_px() {
+            // Beside a line stands lettering, which is no part of it.
+            let gap =
+                (piece.along_px[0] - row.along_px[1]).max(row.along_px[0] - piece.along_px[1]);
+            let longer = piece.length_px() > row.length_px();
+            if gap > GAP * row.length_px().max(piece.length_px()) {
+                if longer {
+                    *row = piece;
+                }
+                continue;
+            }
+            if longer {
                 (row.across_px, row.width_px) = (piece.across_px, piece.width_px);
             }
-            row.along_px = [
-                row.along_px[0].min(piece.along_px[0]),
-                row.along_px[1].max(piece.along_px[1]),
-            ];
+            row.along_px =
+                [row.along_px[0].min(piece.along_px[0]), row.along_px[1].max(piece.along_px[1])];
             continue;
         }
         rows.push(piece);

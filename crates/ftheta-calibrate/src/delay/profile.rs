@@ -1,5 +1,6 @@
 //! Profiles of lines in a picture: where their middle is, how wide they are, where they end.
 
+use super::growth::ROW_WEIGHTS;
 use crate::levenberg::minimise;
 use ftheta_model::picture::{Picture, PixelPoint};
 
@@ -11,6 +12,8 @@ const STANDS_OUT: f64 = 0.02;
 const SOFT_PX: f64 = 1.2;
 /// Softest and hardest edge that is one, px.
 const SOFT_MIN_PX: f64 = 0.15;
+/// Darkest ground that brightness is divided by.
+const GROUND_MIN: f64 = 0.02;
 
 /// A short piece of a line and what is beside it.
 #[derive(Clone, Copy, Debug)]
@@ -107,21 +110,14 @@ pub fn edge(
     let n = (reach_px / STEP_PX).floor() as i32;
     let [x, y] = outward;
     // Across, a bell: the tip is round, so the same rows have to be taken of all lines.
-    let across: Vec<(f64, f64)> = (-4..=4)
-        .map(|index| {
-            let share = 0.25 * f64::from(index);
-            (share * half_width_px, (-2.0 * share * share).exp())
-        })
-        .collect();
+    let across = ROW_WEIGHTS.map(|(share, weight)| (share * half_width_px, weight));
     let total: f64 = across.iter().map(|(_, weight)| weight).sum();
     let samples: Vec<(f64, f64)> = (-n..=n)
         .map(|index| {
             let t = f64::from(index) * STEP_PX;
             let value = across.iter().map(|(off, weight)| {
-                let at = PixelPoint::new(
-                    middle.x_px + x * t - y * off,
-                    middle.y_px + y * t + x * off,
-                );
+                let at =
+                    PixelPoint::new(middle.x_px + x * t - y * off, middle.y_px + y * t + x * off);
                 weight * f64::from(picture.at(at))
             });
             (t, value.sum::<f64>() / total)
@@ -154,14 +150,15 @@ pub fn edge(
 
 /// Widths of lines of one picture from their mean profiles across, mm, and the blur, px.
 ///
-/// Depth and blur are those of the picture, the same for all: a line that is narrower than the
-/// blur shows less deep.
+/// Depth, by the ground's brightness, and blur are those of the picture, the same for all: a line
+/// that is narrower than the blur shows less deep.
 ///
 /// * `profiles`: brightness across, every half pixel, the line in the middle
 ///
 /// `None` if they are no lines.
 pub fn widths_px(profiles: &[Vec<f64>], bright: bool) -> Option<(Vec<f64>, f64)> {
     let sign = if bright { 1.0 } else { -1.0 };
+    let profiles: Vec<Vec<f64>> = profiles.iter().map(|profile| by_ground(profile)).collect();
     let depths = profiles.iter().map(|profile| {
         let ground = 0.5 * (profile.first()? + profile.last()?);
         profile.iter().map(|value| sign * (value - ground)).reduce(f64::max)
@@ -184,7 +181,8 @@ pub fn widths_px(profiles: &[Vec<f64>], bright: bool) -> Option<(Vec<f64>, f64)>
             let middle = 0.5 * (profile.len() - 1) as f64;
             out.extend(profile.iter().enumerate().map(|(at, value)| {
                 let off = (at as f64 - middle) * STEP_PX;
-                let covered = 0.5 * (libm::erf((off + half) / soft) - libm::erf((off - half) / soft));
+                let covered =
+                    0.5 * (libm::erf((off + half) / soft) - libm::erf((off - half) / soft));
                 ground + sign * p[0] * covered - value
             }));
         }
@@ -192,4 +190,13 @@ pub fn widths_px(profiles: &[Vec<f64>], bright: bool) -> Option<(Vec<f64>, f64)>
         out.push(0.1 * (p[0] / depth - 1.0));
     })?;
     Some((found.parameters[2..2 + n].to_vec(), found.parameters[1].abs()))
+}
+
+/// A profile by its ground's brightness, so that uneven light does not count.
+fn by_ground(profile: &[f64]) -> Vec<f64> {
+    let ground = match *profile {
+        [first, .., last] => 0.5 * (first + last),
+        _ => 1.0,
+    };
+    profile.iter().map(|value| value / ground.max(GROUND_MIN)).collect()
 }

@@ -127,7 +127,8 @@ fn fit(ends: &[LineEnd], growth: &Growth, square: bool) -> Option<(Regression, f
     let variance = sum / (n_used - n_columns) as f64;
     let sd = |index: usize| (variance * inverse[(index, index)]).sqrt();
     let both = inverse[(0, 0)] + inverse[(1, 1)] + 2.0 * inverse[(0, 1)];
-    let (curvature, curvature_sd) = if square { (solution[N_BASE], sd(N_BASE)) } else { (0.0, 0.0) };
+    let (curvature, curvature_sd) =
+        if square { (solution[N_BASE], sd(N_BASE)) } else { (0.0, 0.0) };
     let regression = Regression {
         tau_on_s: solution[0] / fastest,
         tau_off_s: solution[1] / fastest,
@@ -217,7 +218,8 @@ mod tests {
 
     #[test]
     fn one_speed_does_not_separate_growth() {
-        let ends: Vec<_> = ends(f64::INFINITY, |_| 0.0).into_iter().filter(|e| e.speed == 0).collect();
+        let ends: Vec<_> =
+            ends(f64::INFINITY, |_| 0.0).into_iter().filter(|e| e.speed == 0).collect();
         let found = regress(&ends, &Growth::Alike);
         assert!(found.is_none_or(|found| found.sd_s[0] > 1e-3));
     }

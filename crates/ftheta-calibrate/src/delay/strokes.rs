@@ -16,6 +16,9 @@ const THRESHOLD_NOISE: f64 = 4.0;
 const CONTRAST_NOISE: f64 = 6.0;
 /// Least contrast, of full scale.
 const CONTRAST_MIN: f64 = 0.02;
+/// Noise by the contrast from which a picture is smoothed, and what that leaves of the noise.
+const NOISY: f64 = 0.05;
+const SMOOTHED: f64 = 0.375;
 /// A stroke is so many times as long as wide, and at least so long.
 const ELONGATION: f64 = 5.0;
 const LENGTH_MIN_PX: f64 = 15.0;
@@ -57,17 +60,24 @@ pub struct Strokes {
 pub fn strokes(picture: &Picture) -> Result<Strokes, DelayError> {
     let noise = noise(picture);
     let mut off = difference(picture);
-    let (low, high) = extremes(&off);
+    let (mut low, mut high) = extremes(&off);
+    let mut noise_left = noise;
+    if noise > NOISY * high.max(-low) {
+        // Lines would fall to pieces; a little of their depth is the smaller loss.
+        smooth(&mut off, picture.width());
+        (low, high) = extremes(&off);
+        noise_left *= SMOOTHED;
+    }
     let bright = high > -low;
     let contrast = high.max(-low);
-    let limit = CONTRAST_MIN.max(CONTRAST_NOISE * noise);
+    let limit = CONTRAST_MIN.max(CONTRAST_NOISE * noise_left);
     if contrast < limit {
         return Err(DelayError::NoContrast { contrast, noise, limit });
     }
     if !bright {
         off.iter_mut().for_each(|value| *value = -*value);
     }
-    let threshold = (THRESHOLD * contrast).max(THRESHOLD_NOISE * noise);
+    let threshold = (THRESHOLD * contrast).max(THRESHOLD_NOISE * noise_left);
     let pieces = pieces(&off, picture.width(), threshold as f32);
     if pieces.len() > N_PIECES_MAX {
         return Err(DelayError::Clutter { n_pieces: pieces.len(), limit: N_PIECES_MAX });
@@ -102,6 +112,29 @@ fn difference(picture: &Picture) -> Vec<f32> {
     let turned = transposed(&along, width);
     let means = transposed(&running_means(&turned, height, reach), height);
     picture.values().iter().zip(means).map(|(value, mean)| value - mean).collect()
+}
+
+/// Every value becomes a mean of its neighbours, 1 2 1 along rows and columns.
+fn smooth(values: &mut [f32], width: usize) {
+    let height = values.len() / width;
+    for row in values.chunks_exact_mut(width) {
+        let mut left = row[0];
+        for x in 0..width {
+            let right = row[(x + 1).min(width - 1)];
+            let here = row[x];
+            row[x] = 0.25 * (left + right) + 0.5 * here;
+            left = here;
+        }
+    }
+    let mut above: Vec<f32> = values[..width].to_vec();
+    for y in 0..height {
+        for x in 0..width {
+            let below = values[(y + 1).min(height - 1) * width + x];
+            let here = values[y * width + x];
+            values[y * width + x] = 0.25 * (above[x] + below) + 0.5 * here;
+            above[x] = here;
+        }
+    }
 }
 
 /// Means of each row over `2 · reach + 1` values, or as many as there are at its ends.
@@ -292,7 +325,8 @@ mod tests {
         let found = strokes(&picture).unwrap();
         assert!(!found.bright);
         let [flat, steep] = found.list[..] else { panic!("{found:?}") };
-        let (flat, steep) = if flat.direction_rad.abs() < 0.1 { (flat, steep) } else { (steep, flat) };
+        let (flat, steep) =
+            if flat.direction_rad.abs() < 0.1 { (flat, steep) } else { (steep, flat) };
         assert!(flat.centre.distance(PixelPoint::new(79.5, 41.5)) < 0.01, "{flat:?}");
         assert!((flat.length_px - 100.0).abs() < 0.5 && (flat.width_px - 4.0).abs() < 0.1);
         assert!(steep.centre.distance(PixelPoint::new(151.0, 59.5)) < 0.01, "{steep:?}");

@@ -61,12 +61,17 @@ pub fn fit_view(
     let mut samples = samples(picture, bright, layout, placement);
     let columns = placement.columns.len() > 1;
     let scale = placement.mm_per_px;
-    let centre = PixelPoint::new(0.5 * (picture.width() - 1) as f64, 0.5 * (picture.height() - 1) as f64);
+    let centre =
+        PixelPoint::new(0.5 * (picture.width() - 1) as f64, 0.5 * (picture.height() - 1) as f64);
     let focal_px = picture.width().max(picture.height()) as f64;
     let lens = CameraLens::plain(focal_px, centre);
     let first = first_guess(layout, placement, &lens);
     let (first, steps): (Vec<f64>, Vec<f64>) = match columns {
-        true => first.into_iter().chain([0.0, 0.0, 0.0]).zip([1e-4; 6].into_iter().chain([1e-6, 1e-6, 1e-4])).unzip(),
+        true => first
+            .into_iter()
+            .chain([0.0, 0.0, 0.0])
+            .zip([1e-4; 6].into_iter().chain([1e-6, 1e-6, 1e-4]))
+            .unzip(),
         false => ([first[0], first[1], first[5]].into_iter()).zip([1e-4; 3]).unzip(),
     };
     let mut parameters = first;
@@ -180,12 +185,7 @@ fn left_px(seen: &impl Fn(PixelPoint) -> Option<[f64; 2]>, sample: &Sample, scal
 }
 
 /// Places along all rows and columns.
-fn samples(
-    picture: &Picture,
-    bright: bool,
-    layout: &Layout,
-    placement: &Placement,
-) -> Vec<Sample> {
+fn samples(picture: &Picture, bright: bool, layout: &Layout, placement: &Placement) -> Vec<Sample> {
     let pitch_px = layout.pitch_mm() / placement.mm_per_px;
     let mut samples = Vec::new();
     for row in &placement.rows {

@@ -20,6 +20,9 @@ pub enum PatternKind {
     Grid(GridPattern),
     /// A square with a cross through its centre: nine places for a ruler.
     Square(SquarePattern),
+    /// Lines both ways at several speeds, whose ends show the laser's delays: what
+    /// `ftheta calibrate delay` needs.
+    Delay(DelayPattern),
     /// The ILDA test pattern: planned, beside what comes of its points played at a constant rate.
     Ilda(IldaPattern),
 }
@@ -110,6 +113,81 @@ pub struct GridPattern {
 pub struct SquarePattern {
     #[command(flatten)]
     pub sheet: SheetArguments,
+}
+
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+#[command(after_help = "\
+Examples:
+  ftheta pattern delay --machine S14-f255 --out delay.svg
+  ftheta mark delay.svg --machine S14-f255
+  ftheta calibrate delay --image photo.jpg --pattern delay.json --machine S14-f255 --out mine.toml
+
+Mark it in the field's centre. Another controller marks the same drawing: in its order and
+directions, each colour with the speed and power that the recipe names; say with --on-us and
+--off-us how its laser delays are set meanwhile.")]
+pub struct DelayPattern {
+    /// Preset (see `ftheta machine list`) or machine file.
+    #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
+    pub machine: String,
+    /// Lines at several speeds, or the open rectangle of one speed.
+    #[arg(long, value_enum, default_value = "comb")]
+    pub method: DelayMethod,
+    /// Axis along which the lines run.
+    #[arg(long, value_enum, default_value = "x")]
+    pub axis: AxisName,
+    /// Speeds, mm/s; 1000 to 10000 if not given, 5000 for a rectangle.
+    #[arg(long, value_name = "V,V,…", value_delimiter = ',', value_parser = positive)]
+    pub speeds: Vec<f64>,
+    /// Lines of each speed each way; 10 if not given, 1 for a rectangle.
+    #[arg(long, value_name = "N")]
+    pub lines: Option<u32>,
+    /// Length of a line, mm; 4 if not given, 10 for a rectangle.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub length_mm: Option<f64>,
+    /// Delays that there is room for, either way, µs.
+    #[arg(long, value_name = "T", default_value = "250", value_parser = positive)]
+    pub room_us: f64,
+    /// Light goes on and off so much later on purpose, µs, so that a rectangle's gaps show; 0 if
+    /// not given, 200,-200 for a rectangle.
+    #[arg(
+        long,
+        value_name = "ON,OFF",
+        value_delimiter = ',',
+        num_args = 2,
+        allow_hyphen_values = true
+    )]
+    pub preset_us: Vec<f64>,
+    /// Setting of the laser-on delay meanwhile, µs, positive is later; as the machine file has it.
+    #[arg(long, value_name = "T", requires = "off_us")]
+    pub on_us: Option<f64>,
+    /// Setting of the laser-off delay meanwhile, µs.
+    #[arg(long, value_name = "T", requires = "on_us")]
+    pub off_us: Option<f64>,
+    /// Power at the fastest speed, W; 10, or what the laser has, if not given. Slower lines have
+    /// less, so that all have the same dose.
+    #[arg(long, value_name = "W", value_parser = positive)]
+    pub power_w: Option<f64>,
+    /// Drawing to write, .svg; beside it go the nominal places (.json) and the recipe
+    /// (.recipe.toml).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DelayMethod {
+    /// Lines both ways at several speeds: separates on and off, and what ends grow by.
+    Comb,
+    /// Two lines between slow sides, of one speed: what the patent describes.
+    Rectangle,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum AxisName {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

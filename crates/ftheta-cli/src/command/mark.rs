@@ -39,7 +39,7 @@ pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
         reserve: arguments.reserve,
         atlas_store: AtlasStore::new(arguments.cache.clone()),
         tolerance_mm: arguments.tolerance_um * 1e-3,
-        order: arguments.order.into(),
+        order: arguments.order.map(Into::into),
         clip: arguments.clip,
         mismatch: arguments.mismatch,
         noise_mm: arguments.noise_um * 1e-3,

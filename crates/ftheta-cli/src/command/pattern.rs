@@ -1,7 +1,8 @@
 //! `ftheta pattern`: patterns to judge or calibrate a head by.
 
 use crate::arguments::pattern::{
-    GridPattern, IldaPattern, Pattern, PatternKind, SheetArguments, SquarePattern,
+    AxisName, DelayMethod, DelayPattern, GridPattern, IldaPattern, Pattern, PatternKind,
+    SheetArguments, SquarePattern,
 };
 use crate::json;
 use crate::progress::Progress;
@@ -10,8 +11,10 @@ use ftheta::atlas_store::AtlasStore;
 use ftheta::formats::pattern_file;
 use ftheta::mark::MarkOptions;
 use ftheta::model::machine::Machine;
+use ftheta::model::pattern::LaserDelays;
 use ftheta::model::recipe::Pen;
 use ftheta::output::{Output, write_file};
+use ftheta::pattern::delay::{self, DelayOptions, LineAxis, Method};
 use ftheta::pattern::grid::{self, GridOptions};
 use ftheta::pattern::ilda::{Comparison, Ilda, PatternOptions, Way, compare};
 use ftheta::pattern::sheet::{Sheet, SheetProcess};
@@ -25,6 +28,7 @@ pub fn run(arguments: &Pattern, as_json: bool) -> Result<(), Error> {
     match &arguments.kind {
         PatternKind::Grid(grid) => run_grid(grid, as_json),
         PatternKind::Square(square) => run_square(square, as_json),
+        PatternKind::Delay(delay) => run_delay(delay, as_json),
         PatternKind::Ilda(ilda) => run_ilda(ilda, as_json),
     }
 }
@@ -48,6 +52,35 @@ fn run_square(arguments: &SquarePattern, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(machine)?;
     let process = process(&machine, *speed, *power_w);
     write_sheet(&square::sheet(*field, &process, &machine)?, out, as_json)
+}
+
+fn run_delay(arguments: &DelayPattern, as_json: bool) -> Result<(), Error> {
+    let machine = machines::find(&arguments.machine)?;
+    let comb = arguments.method == DelayMethod::Comb;
+    let or = |given: &[f64], usual: &[f64]| match given {
+        [] => usual.to_vec(),
+        given => given.to_vec(),
+    };
+    let usual: &[f64] = if comb { &[1e3, 2e3, 4e3, 6e3, 8e3, 1e4] } else { &[5e3] };
+    let preset_us = or(&arguments.preset_us, if comb { &[0.0, 0.0] } else { &[200.0, -200.0] });
+    let options = DelayOptions {
+        method: if comb { Method::Comb } else { Method::Rectangle },
+        axis: match arguments.axis {
+            AxisName::X => LineAxis::X,
+            AxisName::Y => LineAxis::Y,
+        },
+        speeds_mm_s: or(&arguments.speeds, usual),
+        n_lines: arguments.lines.unwrap_or(if comb { 10 } else { 1 }),
+        length_mm: arguments.length_mm.unwrap_or(if comb { 4.0 } else { 10.0 }),
+        room_s: arguments.room_us * 1e-6,
+        preset_s: [preset_us[0] * 1e-6, preset_us[1] * 1e-6],
+        laser: arguments
+            .on_us
+            .zip(arguments.off_us)
+            .map(|(on_us, off_us)| LaserDelays { on_us, off_us }),
+        power_w: process(&machine, None, arguments.power_w).power_w,
+    };
+    write_sheet(&delay::sheet(&options, &machine)?, &arguments.out, as_json)
 }
 
 /// The machine's usual settings, changed where the user says so.

@@ -21,6 +21,29 @@ pub enum PatternError {
         /// Side of the machine's field, mm.
         limit_mm: f64,
     },
+    /// A delay pattern that reaches beyond the machine's field.
+    #[error(
+        "the pattern is {reach_mm:.1} mm wide or high, the machine's field is {limit_mm} mm: take \
+         fewer or slower lines, or less room"
+    )]
+    DelayField {
+        /// Its longer side, mm.
+        reach_mm: f64,
+        /// Side of the machine's field, mm.
+        limit_mm: f64,
+    },
+    /// An option out of its range.
+    #[error("{option} is {value} {unit}, expected {} to {}", limits[0], limits[1])]
+    Option {
+        /// Which.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// Its range.
+        limits: [f64; 2],
+    },
     /// Marks that come too near to each other.
     #[error(
         "marks of {size_mm} mm are too large, {limit_mm} mm is the limit with {pitch_mm} mm between centres"
@@ -82,6 +105,12 @@ impl PatternError {
             Self::Points { letter_mm, limit_mm, .. } => {
                 ("--points".into(), mm(letter_mm), mm(limit_mm))
             }
+            Self::DelayField { reach_mm, limit_mm } => ("field".into(), mm(reach_mm), mm(limit_mm)),
+            Self::Option { option, value, unit, limits: [least, most] } => (
+                (*option).into(),
+                format!("{value} {unit}").trim().into(),
+                format!("{least} to {most}"),
+            ),
             Self::Side { n_side } => ("--points".into(), n_side.to_string(), "odd, 3 to 65".into()),
         }
     }

@@ -74,8 +74,8 @@ pub fn sheet(options: &GridOptions, machine: &Machine) -> Result<Sheet, PatternE
         layers: vec![mark_layer(&pattern), label_layer(&pattern, options, &sizes)],
         ..Sheet::new_job(&options.process, side_mm)
     };
-    let hatch_spacing_mm = HATCH_SPOTS * machine.laser.spot_diameter_mm;
-    Ok(Sheet { pattern, job, hatch_spacing_mm, places })
+    let hatch_spacing_mm = Some(HATCH_SPOTS * machine.laser.spot_diameter_mm);
+    Ok(Sheet { pattern, job, hatch_spacing_mm, keep_order: false, places })
 }
 
 /// The name of a mark: letters of its column, number of its row from 1.

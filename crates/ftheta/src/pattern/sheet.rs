@@ -33,8 +33,10 @@ pub struct Sheet {
     pub pattern: Pattern,
     /// Features, labels and signs as a drawing whose page's centre is the field's.
     pub job: Job,
-    /// Distance of the lines that fill areas, mm.
-    pub hatch_spacing_mm: f64,
+    /// Distance of the lines that fill areas, mm; `None` if there are none.
+    pub hatch_spacing_mm: Option<f64>,
+    /// Whether marks have to be made in the drawing's order and directions.
+    pub keep_order: bool,
     /// Places to measure, each with its name.
     pub places: Vec<(String, FieldPoint)>,
 }
@@ -69,8 +71,8 @@ impl Sheet {
         Job { pens: vec![pen], layers: Vec::new(), page_mm: [side_mm; 2] }
     }
 
-    /// Writes `OUT` (the drawing) and beside it `.json`, `.csv` and `.recipe.toml`; returns kind
-    /// and path of each.
+    /// Writes `OUT` (the drawing) and beside it `.json`, `.recipe.toml`, and `.csv` if there are
+    /// places to measure; returns kind and path of each.
     ///
     /// # Errors
     /// If a file cannot be written, `out` does not end in `.svg`, or the table beside it has been
@@ -84,31 +86,44 @@ impl Sheet {
         }
         let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
         let mut output = Output::new(folder.unwrap_or(Path::new(".")))?;
-        let files = [
+        let mut files = vec![
             ("drawing", out.to_path_buf(), svg_write::to_svg(&self.job)),
             ("recipe", out.with_extension("recipe.toml"), self.recipe()),
             ("features", out.with_extension("json"), pattern_file::write(&self.pattern)),
-            ("points", table, self.table()),
         ];
+        if !self.places.is_empty() {
+            files.push(("points", table, self.table()));
+        }
         for (_, path, content) in &files {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             output.add(&name, |out| out.write_all(content.as_bytes()))?;
         }
         output.publish()?;
-        Ok(files.map(|(kind, path, _)| (kind, path.display().to_string())).into())
+        let written = files.into_iter();
+        Ok(written.map(|(kind, path, _)| (kind, path.display().to_string())).collect())
     }
 
     /// The recipe file that `ftheta mark` finds beside the drawing.
     fn recipe(&self) -> String {
-        let pen = self.job.pens.first().cloned().unwrap_or_default();
-        // Tenths of a micrometre are fine enough, and short to read.
-        let spacing_mm = (self.hatch_spacing_mm * 1e4).round() * 1e-4;
-        format!(
-            "# How the pattern is marked. Dots are filled with lines this far apart.\n\
-             [[pen]]\nname = \"pattern\"\ncolor = \"{COLOR}\"\nmark_speed_mm_s = {}\n\
-             power_w = {}\nhatch_spacing_mm = {spacing_mm:.4}\n",
-            pen.mark_speed_mm_s, pen.power_w
-        )
+        let mut text = String::from("# How the pattern is marked.\n");
+        if self.keep_order {
+            text.push_str("order = \"keep\" # directions matter\n");
+        }
+        for (index, pen) in self.job.pens.iter().enumerate() {
+            let name = if index == 0 { "pattern" } else { &pen.name };
+            text.push_str(&format!(
+                "\n[[pen]]\nname = \"{name}\"\ncolor = \"{}\"\nmark_speed_mm_s = {}\n\
+                 power_w = {}\n",
+                pen.name, pen.mark_speed_mm_s, pen.power_w
+            ));
+            if let Some(spacing_mm) = self.hatch_spacing_mm {
+                // Tenths of a micrometre are fine enough, and short to read.
+                text.push_str(&format!(
+                    "hatch_spacing_mm = {spacing_mm:.4} # dots are filled with lines this far apart\n"
+                ));
+            }
+        }
+        text
     }
 
     /// The table that the user fills in.

@@ -1,0 +1,100 @@
+//! Delays from the gaps between fast lines and the slow sides of a rectangle.
+//!
+//! The patent measures from a side's outer edge to where the line seems to begin: that is too much
+//! by half a side's width and too little by what the end grows, `(W/2 - b)/v` in all, and no number
+//! of lines averages it away. Here it is measured from the middle of a side, and the growth comes
+//! from the width of the lines and the spot. Source: optics.md D.2.
+
+use super::error::DelayError;
+use super::growth::{Growth, USUAL_WIDTH, seen_growth};
+use super::layout::Layout;
+use super::{Delays, LineEndSeen, Method, Observed};
+
+/// What the growth is uncertain by, as a part of the width: with a spot from a data sheet, and
+/// without.
+const GROWTH_SD: [f64; 2] = [0.03, 0.08];
+/// Largest dose over threshold that is reckoned with, as a logarithm.
+const LOG_DOSE_MAX: f64 = 7.0;
+
+/// Delays of a rectangle.
+pub fn rectangle(
+    picture: &ftheta_model::picture::Picture,
+    layout: &Layout,
+    speeds: &[f64],
+    spot_radius_mm: Option<f64>,
+) -> Result<Delays, DelayError> {
+    if layout.columns_mm.len() < 2 {
+        return Err(DelayError::NoSides { n_sides: layout.columns_mm.len() });
+    }
+    let n_ends = 2 * layout.rows.iter().filter(|row| row.process.is_some()).count();
+    let observed = Observed::new(picture, layout).map_err(|error| match error {
+        // Lines that touch a side are no strokes of their own.
+        DelayError::LinesMissing { n_found, .. } if n_found > 0 => {
+            DelayError::NoGap { n_free: 0, n_ends }
+        }
+        other => other,
+    })?;
+    let ends = observed.line_ends(layout, speeds);
+    let n_free = ends.len();
+    if n_free < n_ends {
+        return Err(DelayError::NoGap { n_free, n_ends });
+    }
+    let widths = observed.widths_by_speed(layout, speeds);
+    let width_mm =
+        widths.iter().map(|width| width.width_mm).sum::<f64>() / widths.len().max(1) as f64;
+    let spot_mm = spot_radius_mm.unwrap_or(width_mm / USUAL_WIDTH);
+    let log_dose = (0.5 * (width_mm / spot_mm).powi(2)).min(LOG_DOSE_MAX);
+    let growth_mm = seen_growth(spot_mm, log_dose.exp(), &observed.look());
+    // How late each end is, and what the patent would say.
+    let late = |on: bool, extra_mm: f64| {
+        let outward = if on { -1.0 } else { 1.0 };
+        let times = ends.iter().filter(|end| end.on == on);
+        times
+            .map(|end| (end.sense * end.off_mm - outward * extra_mm) / end.speed_mm_s)
+            .collect::<Vec<f64>>()
+    };
+    let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
+    let [on, off] = [true, false].map(|on| late(on, growth_mm));
+    // The patent's gap reaches to the outer edge, so half a width more, and nothing for the growth.
+    let patent_s = [true, false].map(|on| mean(&late(on, 0.5 * width_mm)));
+    let speed = mean(speeds);
+    let edge_sd_s = observed.facts.mm_per_px * 0.1 / speed / (0.5 * on.len().max(1) as f64).sqrt();
+    let growth_sd_mm = GROWTH_SD[usize::from(spot_radius_mm.is_none())] * width_mm;
+    let sd_s = (growth_sd_mm / speed).hypot(edge_sd_s);
+    let lines = observed.lines.iter().enumerate().map(|(index, line)| {
+        let row = &layout.rows[line.row];
+        let of = |on: bool| {
+            let end = ends.iter().find(|end| end.row == index && end.on == on);
+            LineEndSeen {
+                pixel: line.ends[usize::from(!on)].ok().map(|end| end.pixel),
+                off_mm: end.map(|end| end.sense * end.off_mm),
+                left_mm: None,
+                reject: None,
+            }
+        };
+        super::Line {
+            id: row.id.clone(),
+            speed_mm_s: speed,
+            forth: row.sense() > 0.0,
+            ends: [of(true), of(false)],
+        }
+    });
+    Ok(Delays {
+        method: Method::Rectangle,
+        tau_on_s: mean(&on),
+        tau_off_s: mean(&off),
+        sd_s: [sd_s, sd_s, edge_sd_s],
+        acceleration_mm_s2: None,
+        growth: Growth::Modelled {
+            spot_radius_mm: spot_mm,
+            clear: spot_radius_mm.is_some(),
+            growth_mm: vec![growth_mm],
+        },
+        growth_mm: 0.0,
+        rms_mm: 0.0,
+        patent_s: Some(patent_s),
+        lines: lines.collect(),
+        widths,
+        scene: observed.facts,
+    })
+}
