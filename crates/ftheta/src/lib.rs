@@ -21,6 +21,7 @@ pub mod mark;
 pub mod mechanism;
 pub mod output;
 pub mod pattern;
+pub mod photograph;
 mod planning;
 pub mod promise;
 pub mod rehearsal;
