@@ -9,7 +9,7 @@ use std::path::PathBuf;
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "\
 Examples:
-  ftheta twin photograph delay.json --machine S10-f160 --seed 7 --laser-on-us 85 --laser-off-us 60 \\
+  ftheta twin photograph delay.json --machine S10-f160 --laser-on-us 85 --laser-off-us 60 \\
       --out delay.png
   ftheta twin photograph grid.json --machine S14-f420 --seed 7 --out grid.jpg
 
