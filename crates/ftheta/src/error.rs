@@ -1,5 +1,6 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use crate::camera::CameraError;
 use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
@@ -157,6 +158,9 @@ pub enum Error {
         /// What is wrong.
         source: PictureFileError,
     },
+    /// A camera gives no picture.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
     /// A photograph cannot be rehearsed.
     #[error(transparent)]
     Photograph(#[from] PhotographError),
@@ -264,6 +268,7 @@ impl Error {
             Self::Field { path, source } => in_file(path, source.fault()),
             Self::PatternFile { path, source } => in_file(path, source.fault()),
             Self::PictureFile { path, source } => in_file(path, source.fault()),
+            Self::Camera(error) => error.fault(),
             Self::Photograph(error) => ("photograph".into(), error.to_string(), String::new()),
             Self::PlanFile { path, source } => in_file(path, source.fault()),
             Self::PlanId { path, found, claimed } => {

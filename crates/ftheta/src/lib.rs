@@ -5,6 +5,7 @@
 
 pub mod against;
 pub mod atlas_store;
+pub mod camera;
 pub mod circle;
 pub mod convert;
 pub mod error;

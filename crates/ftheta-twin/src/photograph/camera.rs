@@ -170,3 +170,62 @@ fn corners(rect: Rect) -> [Point; 8] {
         Point::new(middle.x + f64::from(i) * half.width, middle.y + f64::from(j) * half.height)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLATE: Rect = Rect { x0: -20.0, y0: 10.0, x1: 60.0, y1: 70.0 };
+
+    fn options() -> CameraOptions {
+        CameraOptions {
+            pixel_mm: None,
+            megapixels: Some(2.0),
+            tilt_deg: None,
+            turn_deg: 0.0,
+            mirrored: false,
+            distortion: 1.0,
+            seed: 3,
+        }
+    }
+
+    #[test]
+    fn all_of_the_plate_is_seen_and_pixels_lead_back() {
+        for (tilt_deg, megapixels) in [(None, 2.0), (Some(0.0), 0.3), (Some(50.0), 1.0)] {
+            let asked = CameraOptions { tilt_deg, megapixels: Some(megapixels), ..options() };
+            let camera = Camera::new(&asked, PLATE).unwrap();
+            let n_pixels = (camera.width * camera.height) as f64;
+            assert!((n_pixels * 1e-6 / megapixels - 1.0).abs() < 0.01);
+            for corner in corners(PLATE) {
+                let pixel = camera.pixel(corner).unwrap();
+                assert!(pixel.x_px > 0.0 && pixel.x_px < camera.width as f64, "{pixel:?}");
+                assert!(pixel.y_px > 0.0 && pixel.y_px < camera.height as f64, "{pixel:?}");
+                assert!(camera.place(pixel).unwrap().distance(corner) < 1e-6);
+                let modelled = camera.view.pixel(corner.into()).unwrap();
+                assert!((1e-4..0.2).contains(&pixel.distance(modelled)));
+            }
+        }
+    }
+
+    /// Where +x and +y of the plate go in the picture.
+    #[test]
+    fn turns_and_mirrors_are_as_asked() {
+        for (turn_deg, mirrored, [right, up]) in [
+            (0.0, false, [(1.0, 0.0), (0.0, -1.0)]),
+            (90.0, false, [(0.0, -1.0), (-1.0, 0.0)]),
+            (0.0, true, [(-1.0, 0.0), (0.0, -1.0)]),
+        ] {
+            let pixel_mm = Some(0.05);
+            let plain = CameraOptions { tilt_deg: Some(0.0), distortion: 0.0, ..options() };
+            let asked = CameraOptions { turn_deg, mirrored, pixel_mm, megapixels: None, ..plain };
+            let camera = Camera::new(&asked, PLATE).unwrap();
+            let at =
+                |x: f64, y: f64| camera.pixel(PLATE.center() + kurbo::Vec2::new(x, y)).unwrap();
+            let home = at(0.0, 0.0);
+            for (pixel, (x, y)) in [(at(1.0, 0.0), right), (at(0.0, 1.0), up)] {
+                let expected = PixelPoint::new(home.x_px + 20.0 * x, home.y_px + 20.0 * y);
+                assert!(pixel.distance(expected) < 1e-9, "{turn_deg} {mirrored}: {pixel:?}");
+            }
+        }
+    }
+}

@@ -5,7 +5,7 @@ use ftheta_model::pattern::{FeatureShape, MarkStyle, Pattern};
 use ftheta_model::picture::PixelPoint;
 use ftheta_model::space::FieldPoint;
 use ftheta_twin::photograph::{Burn, Camera, Printer, Segment};
-use kurbo::{Line, Point, Vec2};
+use kurbo::{Line, Point, Rect, Vec2};
 
 /// A place on the plate and in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ impl Truth {
             let centre = match &feature.shape {
                 FeatureShape::Mark(mark) if mark.style == MarkStyle::Cross => crossing(runs),
                 FeatureShape::Mark(_) => middle(runs),
-                FeatureShape::Fiducial { burned: true, place_mm, .. } => Some((*place_mm).into()),
+                FeatureShape::Fiducial { burned: true, .. } => bounds(runs).map(|all| all.center()),
                 _ => printed.iter().find(|(of, _)| *of == index).map(|(_, centre)| *centre),
             };
             let id = || feature.id.clone();
@@ -93,6 +93,12 @@ fn middle(runs: &[&[Segment]]) -> Option<Point> {
         energy_j += segment.energy_j;
     }
     (energy_j > 0.0).then(|| (sum / energy_j).to_point())
+}
+
+/// Bounds of all that was burned.
+fn bounds(runs: &[&[Segment]]) -> Option<Rect> {
+    let segments = runs.iter().flat_map(|run| run.iter());
+    segments.map(|segment| Rect::from_points(segment.from, segment.to)).reduce(|a, b| a.union(b))
 }
 
 /// Side of a pixel at a place, mm.
