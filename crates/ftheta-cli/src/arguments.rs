@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod field;
 pub mod pattern;
+pub mod photograph;
 
 use calibrate::{Calibrate, Twin};
 use clap::{Args, Parser, Subcommand, ValueEnum};

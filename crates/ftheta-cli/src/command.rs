@@ -9,6 +9,7 @@ pub mod machine;
 pub mod mark;
 pub mod mechanism;
 pub mod pattern;
+pub mod photograph;
 pub mod verify;
 
 use crate::arguments::Arguments;

@@ -9,4 +9,5 @@ pub mod hidden_head;
 mod light;
 pub mod mismatch;
 pub mod open_loop;
+pub mod photograph;
 pub mod twin;

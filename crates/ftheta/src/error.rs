@@ -1,8 +1,10 @@
 //! Everything that can go wrong between a file and a marked field.
 
+use crate::camera::CameraError;
 use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
+use crate::photograph::PhotographError;
 use ftheta_calibrate::error::CalibrateError;
 use ftheta_formats::cor_file::CorFileError;
 use ftheta_formats::correction_file::CorrectionFileError;
@@ -156,6 +158,12 @@ pub enum Error {
         /// What is wrong.
         source: PictureFileError,
     },
+    /// A camera gives no picture.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// A photograph cannot be rehearsed.
+    #[error(transparent)]
+    Photograph(#[from] PhotographError),
     /// A plan file is at fault.
     #[error("{path}: {source}", path = path.display())]
     PlanFile {
@@ -260,6 +268,8 @@ impl Error {
             Self::Field { path, source } => in_file(path, source.fault()),
             Self::PatternFile { path, source } => in_file(path, source.fault()),
             Self::PictureFile { path, source } => in_file(path, source.fault()),
+            Self::Camera(error) => error.fault(),
+            Self::Photograph(error) => ("photograph".into(), error.to_string(), String::new()),
             Self::PlanFile { path, source } => in_file(path, source.fault()),
             Self::PlanId { path, found, claimed } => {
                 (path.display().to_string(), found.clone(), claimed.clone())

@@ -4,7 +4,7 @@ use crate::Error;
 use ftheta_formats::picture_file::{self, PictureRead};
 use ftheta_formats::{pattern_file, recipe, svg};
 use ftheta_model::calibration::MeasuredPoint;
-use ftheta_model::job::Job;
+use ftheta_model::job::{Job, Shape};
 use ftheta_model::pattern::Pattern;
 use ftheta_model::recipe::Recipe;
 use ftheta_model::warning::Imported;
@@ -104,4 +104,20 @@ pub fn pattern(path: &Path) -> Result<Pattern, Error> {
 pub fn picture(path: &Path) -> Result<PictureRead, Error> {
     picture_file::read(&bytes(path)?)
         .map_err(|source| Error::PictureFile { path: path.into(), source })
+}
+
+/// What a drawing beside a pattern letters on the sheet: `grid.svg` beside `grid.json`, its layer
+/// `labels`; nothing if there is no such drawing.
+///
+/// # Errors
+/// If the drawing is at fault.
+pub fn labels_beside(pattern: &Path) -> Result<Vec<Shape>, Error> {
+    let path = pattern.with_extension("svg");
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let (recipe, _) = recipe_for(&path, None)?;
+    let job = drawing(&path, &recipe, &svg::SvgOptions::default())?.value;
+    let layers = job.layers.into_iter().filter(|layer| layer.name == "labels");
+    Ok(layers.flat_map(|layer| layer.shapes).collect())
 }

@@ -5,6 +5,7 @@
 
 pub mod against;
 pub mod atlas_store;
+pub mod camera;
 pub mod circle;
 pub mod convert;
 pub mod error;
@@ -21,6 +22,7 @@ pub mod mark;
 pub mod mechanism;
 pub mod output;
 pub mod pattern;
+pub mod photograph;
 mod planning;
 pub mod promise;
 pub mod rehearsal;

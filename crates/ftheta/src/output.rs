@@ -1,7 +1,8 @@
 //! Writes results so that no file is ever left looking whole when it is not.
 
 use crate::Error;
-use ftheta_formats::plan_file;
+use ftheta_formats::{picture_file, plan_file};
+use ftheta_model::picture::Picture;
 use ftheta_physics::plan::Plan;
 use std::fs;
 use std::io::{BufWriter, Write};
@@ -24,6 +25,43 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
     let mut output = Output::new(folder.unwrap_or(Path::new(".")))?;
     output.add(&name, |out| out.write_all(content))?;
     output.publish()
+}
+
+/// How a picture is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// As PNG.
+    Png,
+    /// As JPEG of this quality, 1 to 100.
+    Jpeg(u8),
+}
+
+impl PictureFormat {
+    /// The format that a file's name asks for.
+    ///
+    /// # Errors
+    /// If it ends neither as PNG nor as JPEG.
+    pub fn of(path: &Path, quality: u8) -> Result<Self, Error> {
+        let extension = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
+        match extension.as_ref().and_then(|extension| extension.to_str()) {
+            Some("png") => Ok(Self::Png),
+            Some("jpg" | "jpeg") => Ok(Self::Jpeg(quality)),
+            _ => Err(Error::Format { path: path.into(), expected: ".png or .jpg" }),
+        }
+    }
+}
+
+/// Writes a picture, grey with 256 shades.
+///
+/// # Errors
+/// If it cannot be written, or is too long for JPEG.
+pub fn write_picture(picture: &Picture, path: &Path, format: PictureFormat) -> Result<(), Error> {
+    let bytes = match format {
+        PictureFormat::Png => picture_file::write_png(picture),
+        PictureFormat::Jpeg(quality) => picture_file::write_jpeg(picture, quality)
+            .ok_or_else(|| Error::Format { path: path.into(), expected: ".png for its size" })?,
+    };
+    write_file(path, &bytes)
 }
 
 impl Output {

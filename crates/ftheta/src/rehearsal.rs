@@ -10,7 +10,7 @@ use crate::planning::Planning;
 use ftheta_model::calibration::MeasuredPoint;
 use ftheta_model::job::{Job, Layer, Paint, Shape};
 use ftheta_model::machine::{Machine, Optics};
-use ftheta_model::pattern::{FeatureShape, MarkStyle, Pattern};
+use ftheta_model::pattern::{FeatureShape, GridMark, MarkStyle, Pattern};
 use ftheta_model::plan::Planner;
 use ftheta_model::recipe::{Pen, Recipe};
 use ftheta_model::space::FieldPoint;
@@ -147,16 +147,11 @@ fn strokes(pattern: &Pattern) -> (Vec<BezPath>, Vec<Sight>) {
     for feature in &pattern.features {
         match &feature.shape {
             FeatureShape::Mark(mark) => {
-                let (centre, half_mm) = (Point::from(mark.place_mm), 0.5 * mark.size_mm);
                 let first = strokes.len();
-                let seen = if mark.style == MarkStyle::Cross {
-                    for arm in [Vec2::new(half_mm, 0.0), Vec2::new(0.0, half_mm)] {
-                        strokes.push(Line::new(centre - arm, centre + arm).to_path(CIRCLE_MM));
-                    }
-                    Seen::Crossing([(first, ARMS), (first + 1, ARMS)])
-                } else {
-                    strokes.push(Circle::new(centre, half_mm).to_path(CIRCLE_MM));
-                    Seen::Ring(first)
+                strokes.extend(mark_curves(mark));
+                let seen = match mark.style {
+                    MarkStyle::Cross => Seen::Crossing([(first, ARMS), (first + 1, ARMS)]),
+                    MarkStyle::Dot => Seen::Ring(first),
                 };
                 sights.push(Sight { id: feature.id.clone(), target: mark.place_mm, seen });
             }
@@ -170,6 +165,17 @@ fn strokes(pattern: &Pattern) -> (Vec<BezPath>, Vec<Sight>) {
     }
     sights.extend(crossings(&lines));
     (strokes, sights)
+}
+
+/// The arms of a cross, along x and along y, or the border of a dot.
+pub(crate) fn mark_curves(mark: &GridMark) -> Vec<BezPath> {
+    let (centre, half_mm) = (Point::from(mark.place_mm), 0.5 * mark.size_mm);
+    match mark.style {
+        MarkStyle::Cross => [Vec2::new(half_mm, 0.0), Vec2::new(0.0, half_mm)]
+            .map(|arm| Line::new(centre - arm, centre + arm).to_path(CIRCLE_MM))
+            .to_vec(),
+        MarkStyle::Dot => vec![Circle::new(centre, half_mm).to_path(CIRCLE_MM)],
+    }
 }
 
 /// Places where two lines meet or cross, each once.

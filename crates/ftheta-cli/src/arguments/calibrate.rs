@@ -1,5 +1,6 @@
 //! Arguments of `ftheta calibrate` and `ftheta twin`.
 
+use super::photograph::TwinPhotograph;
 use super::{noise, positive};
 use clap::{Args, Subcommand, ValueEnum};
 use ftheta::calibrate::calibrate::Model;
@@ -92,6 +93,8 @@ pub struct Twin {
 pub enum TwinAction {
     /// Mark a pattern on a twin whose head has hidden errors, and measure it there.
     Measure(TwinMeasure),
+    /// Burn a pattern on such a twin, and take a photograph of it.
+    Photograph(Box<TwinPhotograph>),
 }
 
 #[derive(Args)]

@@ -34,6 +34,7 @@ pub fn run(arguments: &Calibrate, as_json: bool) -> Result<(), Error> {
 pub fn run_twin(arguments: &Twin, as_json: bool) -> Result<(), Error> {
     match &arguments.action {
         TwinAction::Measure(measure) => run_measure(measure, as_json),
+        TwinAction::Photograph(photograph) => super::photograph::run(photograph, as_json),
     }
 }
 
