@@ -184,6 +184,8 @@ fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
     };
     // The diffraction limit; a measured spot overrides it.
     let limit_mm = spot_diameter_mm(wavelength_nm, beam_quality_m2, focal_mm, beam_diameter_mm);
+    let timing = |key| Ok(nanoseconds(section.number(key, -1e4..=1e4)?.unwrap_or(0.0)));
+    let mirror_delay_ns = timing("mirror_delay_us")?;
     let spot_um = section.number("spot_diameter_um", 0.5..=1e4)?;
     Ok(Laser {
         wavelength_nm,
@@ -191,8 +193,9 @@ fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
         beam_diameter_mm,
         spot_diameter_mm: spot_um.map_or(limit_mm, |um| um * 1e-3),
         power_max_w: section.need("power_max_w", 1e-3..=1e5)?,
-        on_latency_ns: nanoseconds(section.number("on_latency_us", 0.0..=1e4)?.unwrap_or(0.0)),
-        off_latency_ns: nanoseconds(section.number("off_latency_us", 0.0..=1e4)?.unwrap_or(0.0)),
+        on_latency_ns: timing("on_latency_us")? - mirror_delay_ns,
+        off_latency_ns: timing("off_latency_us")? - mirror_delay_ns,
+        mirror_delay_ns,
         minimum_on_ns: nanoseconds(section.number("minimum_on_us", 0.0..=1e5)?.unwrap_or(0.0)),
         power_modulated: section.boolean("power_modulated")?.unwrap_or(true),
         pulse_khz: section.number("pulse_khz", 0.001..=1e6)?,

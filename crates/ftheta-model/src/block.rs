@@ -12,7 +12,8 @@ pub struct Block {
     /// What a driver that is sent voltages gets instead of words, one pair per tick; empty where
     /// words are sent.
     pub volts: Vec<[VoltageSample; 2]>,
-    /// Laser edges whose time lies within this block, in order.
+    /// Laser edges whose time lies within this block, in order; those whose light leads its signal
+    /// come with the block in which the light does.
     pub edges: Vec<LaserEdge>,
 }
 

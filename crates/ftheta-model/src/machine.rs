@@ -177,10 +177,14 @@ pub struct Laser {
     pub spot_diameter_mm: f64,
     /// Greatest power, W.
     pub power_max_w: f64,
-    /// Light follows the on edge by this much, ns.
+    /// Light follows the on edge by this much, less what the mirrors are late by, ns; below 0 where
+    /// the mirrors are later.
     pub on_latency_ns: i64,
-    /// Light ends after the off edge by this much, ns.
+    /// Light ends after the off edge by this much, less what the mirrors are late by, ns.
     pub off_latency_ns: i64,
+    /// Mirrors follow their words by this much beside what the servo's model says, ns. It is taken
+    /// off both latencies already, and kept so that a file says what its user wrote.
+    pub mirror_delay_ns: i64,
     /// Shortest light that the source gives as asked, ns: a shorter pulse of the signal gives less
     /// or none.
     pub minimum_on_ns: i64,

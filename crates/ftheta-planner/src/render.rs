@@ -203,6 +203,9 @@ impl<'a> Renderer<'a> {
 
     fn push_edges(&mut self, block: &mut Block) {
         let end_ns = self.next_index * u64::from(self.plan.machine.output.period_ns);
+        let laser = &self.plan.machine.laser;
+        let leads_ns =
+            [laser.on_latency_ns, laser.off_latency_ns].map(|ns| ns.min(0).unsigned_abs());
         while let Some(mark) = self.plan.marks.get(self.mark_index) {
             let edge = if self.n_edges == 0 {
                 LaserEdge { time_ns: mark.on_ns, power_w: mark.power_w }
@@ -211,7 +214,9 @@ impl<'a> Renderer<'a> {
             } else {
                 LaserEdge { time_ns: mark.off_ns, power_w: 0.0 }
             };
-            if edge.time_ns >= end_ns {
+            // Light before its signal cannot be had later than the signal's own block.
+            let lead_ns = if edge.power_w > 0.0 { leads_ns[0] } else { leads_ns[1] };
+            if edge.time_ns.saturating_sub(lead_ns) >= end_ns {
                 break;
             }
             block.edges.push(edge);

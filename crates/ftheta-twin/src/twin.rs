@@ -4,13 +4,14 @@ use crate::beam::{Beam, Command};
 use crate::exposure::Exposure;
 use crate::light::LaserState;
 use crate::mismatch::Mismatch;
-use ftheta_model::block::{Block, SampleSink};
+use ftheta_model::block::{Block, SampleSink, VoltageSample};
 use ftheta_model::dose::DoseMap;
 use ftheta_model::machine::Machine;
-use ftheta_model::space::FieldPoint;
+use ftheta_model::space::{DacCodes, FieldPoint};
 use ftheta_model::trace::{Trace, TracePoint};
 use ftheta_physics::head::{Head, Tracer};
 use ftheta_physics::servo::ServoError;
+use std::collections::VecDeque;
 use thiserror::Error;
 
 /// What the twin is told beside the machine file.
@@ -53,6 +54,16 @@ pub struct Twin {
     rad_per_word: f64,
     period_ns: u64,
     next_index: u64,
+    /// Ticks taken and not yet played: light that leads its signal is known no sooner.
+    held: VecDeque<Tick>,
+    n_held: usize,
+}
+
+/// What a tick brings.
+#[derive(Clone, Copy)]
+struct Tick {
+    word: DacCodes,
+    volts: Option<[VoltageSample; 2]>,
 }
 
 impl Twin {
@@ -63,6 +74,8 @@ impl Twin {
     pub fn new(machine: &Machine, options: &TwinOptions) -> Result<Self, ServoError> {
         let beam = Beam::new(machine, &options.mismatch, options.seed)?;
         let period_ns = u64::from(machine.output.period_ns);
+        let latencies_ns = [machine.laser.on_latency_ns, machine.laser.off_latency_ns];
+        let lead_ns = latencies_ns.map(|ns| ns.min(0).unsigned_abs()).into_iter().fold(0, u64::max);
         let trace = Trace { step_ns: period_ns / beam.n_substeps() as u64, ..Trace::default() };
         Ok(Self {
             beam,
@@ -75,6 +88,8 @@ impl Twin {
             rad_per_word: machine.output.word_step_rad(),
             period_ns,
             next_index: 0,
+            held: VecDeque::new(),
+            n_held: lead_ns.div_ceil(period_ns) as usize,
         })
     }
 
@@ -85,6 +100,13 @@ impl Twin {
     pub fn with_head(mut self, head: &Head) -> Self {
         self.beam.set_head(Tracer::new(head));
         self
+    }
+
+    /// Plays what is held back, after the last block.
+    pub fn finish(&mut self) {
+        while let Some(tick) = self.held.pop_front() {
+            self.play(tick);
+        }
     }
 
     /// What has happened since the last call. The first point of a stretch is the last one of
@@ -105,6 +127,33 @@ impl Twin {
     /// The energy on the work plane after everything that was played.
     pub fn into_dose(self) -> DoseMap {
         self.exposure.blurred(self.spot_diameter_mm)
+    }
+
+    /// Plays one tick.
+    fn play(&mut self, Tick { word, volts }: Tick) {
+        let angles_rad = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
+        let command = volts.as_ref().map_or(Command::Angles(angles_rad), Command::Volts);
+        let mut places = [FieldPoint::default(); 100];
+        let n_substeps = self.beam.n_substeps();
+        let mut n_visited = 0;
+        self.beam.tick(command, |place| {
+            places[n_visited] = place;
+            n_visited += 1;
+        });
+        let mut now_ns = self.next_index * self.period_ns;
+        for &place in &places[..n_substeps] {
+            let end_ns = now_ns + self.trace.step_ns;
+            if self.laser.power_w() > 0.0 || self.laser.next_ns() < end_ns {
+                self.expose(now_ns, self.last, place);
+            }
+            self.trace.points.push(place.into());
+            self.last = place;
+            now_ns = end_ns;
+        }
+        self.next_index += 1;
+        if self.next_index.is_multiple_of(self.state_stride) {
+            self.trace.states.push(self.beam.states(now_ns));
+        }
     }
 
     /// Spreads energy over a sub-step in which light may change.
@@ -136,34 +185,17 @@ impl SampleSink for Twin {
     type Error = TwinError;
 
     fn push(&mut self, block: &Block) -> Result<(), TwinError> {
-        if block.first_index != self.next_index {
-            return Err(TwinError::Gap { found: block.first_index, expected: self.next_index });
+        let expected = self.next_index + self.held.len() as u64;
+        if block.first_index != expected {
+            return Err(TwinError::Gap { found: block.first_index, expected });
         }
         block.edges.iter().for_each(|&edge| self.laser.take(edge));
-        let mut places = [FieldPoint::default(); 100];
-        let n_substeps = self.beam.n_substeps();
-        for (index, word) in block.words.iter().enumerate() {
-            let angles_rad = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
-            let command =
-                block.volts.get(index).map_or(Command::Angles(angles_rad), Command::Volts);
-            let mut n_visited = 0;
-            self.beam.tick(command, |place| {
-                places[n_visited] = place;
-                n_visited += 1;
-            });
-            let mut now_ns = self.next_index * self.period_ns;
-            for &place in &places[..n_substeps] {
-                let end_ns = now_ns + self.trace.step_ns;
-                if self.laser.power_w() > 0.0 || self.laser.next_ns() < end_ns {
-                    self.expose(now_ns, self.last, place);
-                }
-                self.trace.points.push(place.into());
-                self.last = place;
-                now_ns = end_ns;
-            }
-            self.next_index += 1;
-            if self.next_index.is_multiple_of(self.state_stride) {
-                self.trace.states.push(self.beam.states(now_ns));
+        for (index, &word) in block.words.iter().enumerate() {
+            self.held.push_back(Tick { word, volts: block.volts.get(index).copied() });
+            if self.held.len() > self.n_held
+                && let Some(tick) = self.held.pop_front()
+            {
+                self.play(tick);
             }
         }
         Ok(())

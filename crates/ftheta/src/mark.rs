@@ -382,6 +382,7 @@ pub(crate) fn score(
         n_blocks += 1;
         twin.push(&block)?;
     }
+    twin.finish();
     look(twin, plan.n_samples());
     Ok(scorer.finish())
 }

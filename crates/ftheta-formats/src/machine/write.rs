@@ -115,8 +115,9 @@ fn laser(machine: &Machine, out: &mut String) {
     scaled(out, "spot_diameter_um", laser.spot_diameter_mm, 1e-3);
     scaled(out, "power_max_w", laser.power_max_w, 1.0);
     for (key, time_ns) in [
-        ("on_latency_us", laser.on_latency_ns),
-        ("off_latency_us", laser.off_latency_ns),
+        ("on_latency_us", laser.on_latency_ns + laser.mirror_delay_ns),
+        ("off_latency_us", laser.off_latency_ns + laser.mirror_delay_ns),
+        ("mirror_delay_us", laser.mirror_delay_ns),
         ("minimum_on_us", laser.minimum_on_ns),
     ] {
         row(out, key, time_ns as f64 * 1e-3, |us| (us * 1e3).round());

@@ -42,6 +42,7 @@ pub fn machine() -> Machine {
             spot_diameter_mm: 0.03,
             power_max_w: 20.0,
             on_latency_ns: 0,
+            mirror_delay_ns: 0,
             off_latency_ns: 0,
             minimum_on_ns: 0,
             power_modulated: true,

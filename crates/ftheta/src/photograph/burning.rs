@@ -44,7 +44,7 @@ pub(super) fn burn(
     }
     observer(Stage::Lay);
     let mark_options = MarkOptions {
-        order: Order::Keep,
+        order: Some(Order::Keep),
         planner: Some(Planner::Classic),
         mismatch: options.mismatch,
         table: options.table.clone(),
@@ -153,6 +153,7 @@ fn play(
             burner.add(&twin.take_trace());
         }
     }
+    twin.finish();
     burner.add(&twin.take_trace());
     Ok(burner.finish())
 }

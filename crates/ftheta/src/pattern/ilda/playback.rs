@@ -76,6 +76,7 @@ pub(super) fn playback(
     };
     let mut twin = twin(machine, &options.mark, &twin_options)?;
     twin.push(&block)?;
+    twin.finish();
     let mut lit = Lit::default();
     lit.add(&twin.take_trace());
     Ok((ilda.traced(&lit, Some(circle), duration_s), twin.into_dose()))
