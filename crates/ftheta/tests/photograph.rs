@@ -28,6 +28,8 @@ fn options(machine: &Machine) -> PhotographOptions {
             late_ns: [0; 2],
             dose: 3.0,
             power: None,
+            dose_slope: 0.0,
+            jitter_mm: 0.0,
             spot_diameter_mm: Some(0.1),
             overburn: 0.0,
             missing: 0.0,

@@ -1,6 +1,6 @@
 //! Arguments of `ftheta twin photograph`.
 
-use super::{number, pair, positive, within};
+use super::{noise, number, pair, positive, within};
 use clap::{Args, ValueEnum};
 use ftheta::photograph::PowerRule;
 use std::path::PathBuf;
@@ -47,6 +47,13 @@ pub struct TwinPhotograph {
     /// that the dose is the same.
     #[arg(long, value_enum)]
     pub power: Option<PowerName>,
+    /// By how much the dose of the fastest line is too large and that of the slowest too small,
+    /// percent.
+    #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = slope)]
+    pub dose_slope: f64,
+    /// How far each line is off its place, µm rms.
+    #[arg(long, value_name = "S", default_value = "1", value_parser = noise)]
+    pub jitter_um: f64,
     /// 1/e² diameter of the spot, µm; the machine's if not given.
     #[arg(long, value_name = "D", value_parser = positive)]
     pub spot_um: Option<f64>,
@@ -156,6 +163,10 @@ fn lateness(text: &str) -> Result<f64, String> {
 
 fn dose(text: &str) -> Result<f64, String> {
     within(number(text)?, 0.1..=1000.0)
+}
+
+fn slope(text: &str) -> Result<f64, String> {
+    within(number(text)?, -90.0..=90.0)
 }
 
 fn percent(text: &str) -> Result<f64, String> {
