@@ -48,6 +48,7 @@ fn options(machine: &Machine) -> PhotographOptions {
             noise: 0.0,
             exposure: 1.0,
             unevenness: 0.0,
+            glare: 0.0,
             n_dirt: 0,
             gamma: 1.0,
             seed: 5,

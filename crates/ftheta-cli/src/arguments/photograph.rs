@@ -105,6 +105,9 @@ pub struct TwinPhotograph {
     /// Unevenness of the light, over that of a lamp beside the plate.
     #[arg(long, value_name = "K", default_value = "1", value_parser = share_of_many)]
     pub unevenness: f64,
+    /// Light of a reflection on the plate; from about 1 on it hides what is there.
+    #[arg(long, value_name = "K", default_value = "0", value_parser = share_of_many)]
+    pub glare: f64,
     /// Unevenness of the material, over that of anodised aluminium.
     #[arg(long, value_name = "K", default_value = "1", value_parser = share_of_many)]
     pub texture: f64,

@@ -104,6 +104,7 @@ fn options(arguments: &TwinPhotograph, machine: &Machine) -> Result<PhotographOp
             noise: arguments.noise,
             exposure: arguments.exposure,
             unevenness: arguments.unevenness,
+            glare: arguments.glare,
             n_dirt: arguments.dirt as usize,
             gamma: arguments.gamma,
             seed,
