@@ -2,69 +2,17 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 
+mod bench;
+
+use bench::{Bench, number};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use tempfile::TempDir;
+use std::path::Path;
+use std::process::Command;
 
 const DRAWING: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm"
     viewBox="0 0 30 20" fill="none" stroke="black"><rect id="frame" x="5" y="5" width="20"
     height="10"/><image id="photo" href="x.png"/></svg>"#;
-
-/// A folder with one drawing in it.
-struct Bench {
-    folder: TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        Self { folder: TempDir::new().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
-        let path = self.path(name);
-        fs::write(&path, content).unwrap();
-        path.to_str().unwrap().into()
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_ftheta"))
-            .args(arguments)
-            .current_dir(self.folder.path())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs with `--json`; the exit code and the one object.
-    fn json(&self, arguments: &[&str]) -> (i32, Value) {
-        let output = self.run(&[arguments, &["--json"]].concat());
-        let value = serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
-            panic!("{error}: {output:?}");
-        });
-        (output.status.code().unwrap(), value)
-    }
-
-    /// The error object of a run that must fail with exit code 1.
-    fn fault(&self, arguments: &[&str]) -> Value {
-        let (code, value) = self.json(arguments);
-        assert_eq!(code, 1, "{value}");
-        for key in ["message", "where", "value", "limit"] {
-            assert!(value["error"][key].is_string(), "{key} in {value}");
-        }
-        value["error"].clone()
-    }
-}
-
-fn number(value: &Value, path: &[&str]) -> f64 {
-    path.iter().fold(value, |value, key| &value[key]).as_f64().unwrap_or_else(|| {
-        panic!("no number at {path:?} in {value}");
-    })
-}
 
 #[test]
 fn mark_writes_its_files_and_one_object() {
@@ -235,7 +183,7 @@ fn killed_runs_leave_nothing_that_looks_whole() {
     bench.write("area.recipe.toml", "[[pen]]\nhatch_spacing_mm = 0.002\nmark_speed_mm_s = 10\n");
     let mut child = Command::new(env!("CARGO_BIN_EXE_ftheta"))
         .args(["mark", "area.svg", "--out", "result"])
-        .current_dir(bench.folder.path())
+        .current_dir(bench.path(""))
         .spawn()
         .unwrap();
     let result = bench.path("result");

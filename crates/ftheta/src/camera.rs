@@ -149,8 +149,8 @@ fn list_in(folder: &Path) -> Vec<CameraDevice> {
 /// * `device`: `/dev/video0`, its number, or `rpicam` for the camera of a Raspberry Pi
 ///
 /// # Errors
-/// If there is no such camera, no program that takes pictures (`v4l2-ctl`, `ffmpeg`; `rpicam-still`,
-/// `libcamera-still`), or no picture within half a minute.
+/// If there is no such camera, no program that takes pictures (`v4l2-ctl` or `ffmpeg`,
+/// `rpicam-still` or `libcamera-still`), or no picture within half a minute.
 pub fn take(device: &str) -> Result<PictureRead, CameraError> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let device = match device.parse::<u32>() {

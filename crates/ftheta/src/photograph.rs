@@ -63,6 +63,11 @@ pub struct BurnOptions {
     /// How power goes with speed; `None` takes the pattern's ratios if they differ among the
     /// speeds, and otherwise constant dose.
     pub power: Option<PowerRule>,
+    /// By how much the dose of the fastest line is too large and that of the slowest too small,
+    /// relative; in between in proportion to the speed.
+    pub dose_slope: f64,
+    /// How far light is off its place, mm rms, along each axis and for each line alone.
+    pub jitter_mm: f64,
     /// 1/e² diameter of the spot, mm; the machine's if `None`.
     pub spot_diameter_mm: Option<f64>,
     /// Peak dose that the first moment of a mark's arm leaves, over that of the arm.
@@ -147,7 +152,8 @@ pub fn photograph(
 ) -> Result<Photograph, Error> {
     let seed = options.camera.seed;
     let strokes = strokes::strokes(pattern, labels, machine, &options.burn, seed);
-    let burned = burning::burn(&strokes, machine, &options.burn, observer)?;
+    let mut burned = burning::burn(&strokes, machine, &options.burn, observer)?;
+    burning::jitter(&mut burned, options.burn.jitter_mm, seed);
     observer(Stage::Finish);
     let [plate, dark, white, black] = if options.bright { BRIGHT_ON_DARK } else { DARK_ON_BRIGHT };
     let [x_mm, y_mm, turn_deg] = options.sheet_lies;

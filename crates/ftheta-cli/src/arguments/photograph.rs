@@ -1,6 +1,6 @@
 //! Arguments of `ftheta twin photograph`.
 
-use super::{number, pair, positive, within};
+use super::{noise, number, pair, positive, within};
 use clap::{Args, ValueEnum};
 use ftheta::photograph::PowerRule;
 use std::path::PathBuf;
@@ -47,6 +47,13 @@ pub struct TwinPhotograph {
     /// that the dose is the same.
     #[arg(long, value_enum)]
     pub power: Option<PowerName>,
+    /// By how much the dose of the fastest line is too large and that of the slowest too small,
+    /// percent.
+    #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = slope)]
+    pub dose_slope: f64,
+    /// How far each line is off its place, µm rms.
+    #[arg(long, value_name = "S", default_value = "1", value_parser = noise)]
+    pub jitter_um: f64,
     /// 1/e² diameter of the spot, µm; the machine's if not given.
     #[arg(long, value_name = "D", value_parser = positive)]
     pub spot_um: Option<f64>,
@@ -98,6 +105,9 @@ pub struct TwinPhotograph {
     /// Unevenness of the light, over that of a lamp beside the plate.
     #[arg(long, value_name = "K", default_value = "1", value_parser = share_of_many)]
     pub unevenness: f64,
+    /// Light of a reflection on the plate; from about 1 on it hides what is there.
+    #[arg(long, value_name = "K", default_value = "0", value_parser = share_of_many)]
+    pub glare: f64,
     /// Unevenness of the material, over that of anodised aluminium.
     #[arg(long, value_name = "K", default_value = "1", value_parser = share_of_many)]
     pub texture: f64,
@@ -156,6 +166,10 @@ fn lateness(text: &str) -> Result<f64, String> {
 
 fn dose(text: &str) -> Result<f64, String> {
     within(number(text)?, 0.1..=1000.0)
+}
+
+fn slope(text: &str) -> Result<f64, String> {
+    within(number(text)?, -90.0..=90.0)
 }
 
 fn percent(text: &str) -> Result<f64, String> {

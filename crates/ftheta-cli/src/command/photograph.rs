@@ -4,6 +4,7 @@ use crate::arguments::photograph::{HeadName, TwinPhotograph};
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::say;
+use ftheta::model::machine::Machine;
 use ftheta::output::{PictureFormat, write_file, write_picture};
 use ftheta::photograph::truth::{TruePlace, Truth};
 use ftheta::photograph::{BurnOptions, Photograph, PhotographOptions, photograph};
@@ -23,7 +24,7 @@ pub fn run(arguments: &TwinPhotograph, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(&arguments.machine)?;
     let pattern = import::pattern(&arguments.pattern)?;
     let labels = import::labels_beside(&arguments.pattern)?;
-    let options = options(arguments)?;
+    let options = options(arguments, &machine)?;
     let photograph = photograph(&pattern, &labels, &machine, &options, &mut |stage| {
         progress.observe(stage);
     })?;
@@ -61,14 +62,12 @@ pub fn run(arguments: &TwinPhotograph, as_json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-fn options(arguments: &TwinPhotograph) -> Result<PhotographOptions, Error> {
-    let machine = machines::find(&arguments.machine)?;
+fn options(arguments: &TwinPhotograph, machine: &Machine) -> Result<PhotographOptions, Error> {
     let true_machine = match &arguments.built_as {
         Some(name) => machines::find(name)?,
         None => machine.clone(),
     };
-    let table =
-        arguments.table.as_deref().map(|path| tables::usable(path, &machine)).transpose()?;
+    let table = arguments.table.as_deref().map(|path| tables::usable(path, machine)).transpose()?;
     let seed = arguments.seed;
     let head = match arguments.head {
         HeadName::Hidden => Some(hidden_head(&true_machine.optics, seed)),
@@ -85,6 +84,8 @@ fn options(arguments: &TwinPhotograph) -> Result<PhotographOptions, Error> {
             late_ns: [ns(arguments.laser_on_us), ns(arguments.laser_off_us)],
             dose: arguments.dose,
             power: arguments.power.map(Into::into),
+            dose_slope: arguments.dose_slope * 1e-2,
+            jitter_mm: arguments.jitter_um * 1e-3,
             spot_diameter_mm: arguments.spot_um.map(|um| um * 1e-3),
             overburn: arguments.overburn,
             missing: arguments.missing * 1e-2,
@@ -103,6 +104,7 @@ fn options(arguments: &TwinPhotograph) -> Result<PhotographOptions, Error> {
             noise: arguments.noise,
             exposure: arguments.exposure,
             unevenness: arguments.unevenness,
+            glare: arguments.glare,
             n_dirt: arguments.dirt as usize,
             gamma: arguments.gamma,
             seed,

@@ -101,7 +101,8 @@ impl Printer {
         let (length_mm, half_mm) = (from.distance(to), 0.5 * LINE_MM);
         let bar = |x: f64| Rect::new(x - half_mm, -0.5 * BAR_MM, x + half_mm, 0.5 * BAR_MM);
         let middle = Rect::new(half_mm, -half_mm, (length_mm - half_mm).max(half_mm), half_mm);
-        let change = self.shades[2] - self.shades[0];
+        let [plate, white, black] = self.shades;
+        let change = if plate > 0.5 { black - plate } else { white - plate };
         [bar(0.0), middle, bar(length_mm)]
             .map(|rect| Print { rect, placed, back: placed.inverse(), change })
             .to_vec()

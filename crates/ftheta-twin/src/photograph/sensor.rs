@@ -14,6 +14,8 @@ const VIGNETTE: f64 = 0.25;
 const SLOPE: f64 = 0.15;
 /// Part of the noise's variance that there is in the dark.
 const DARK: f64 = 0.15;
+/// Size of a reflection, of the picture's half diagonal.
+const GLARE: f64 = 0.12;
 /// Brightness of dirt.
 const DIRT: f32 = 0.3;
 
@@ -28,6 +30,8 @@ pub struct Sensor {
     pub exposure: f64,
     /// Unevenness of the light over that of a lamp beside the plate; 0 is even.
     pub unevenness: f64,
+    /// Light that is reflected from somewhere on the plate, at its brightest; 0 is none.
+    pub glare: f64,
     /// Specks and fibres on the plate.
     pub n_dirt: usize,
     /// Shades are the light to the power of 1/gamma.
@@ -42,6 +46,8 @@ pub fn expose(scene: &Scene, camera: &Camera, sensor: &Sensor) -> Picture {
     let mut light = scene.radiance(camera);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(sensor.seed ^ 0x7365_6e73_6f72);
     let from_rad = TAU * uniform(&mut random);
+    // Where a reflection is, of the half diagonal from the middle.
+    let glare = [uniform(&mut random) - 0.5, uniform(&mut random) - 0.5];
     for _ in 0..sensor.n_dirt {
         drop_dirt(&mut light, [width, height], &mut random);
     }
@@ -56,7 +62,10 @@ pub fn expose(scene: &Scene, camera: &Camera, sensor: &Sensor) -> Picture {
         for (x, value) in row.iter_mut().enumerate() {
             let u = (x as f64 - 0.5 * width as f64) / radius_px;
             let uneven = SLOPE * (u * cos + v * sin) - VIGNETTE * (u * u + v * v);
-            let lit = f64::from(*value) * sensor.exposure * (1.0 + sensor.unevenness * uneven);
+            let reflected = ((u - glare[0]).powi(2) + (v - glare[1]).powi(2)) / (GLARE * GLARE);
+            let lit = f64::from(*value) * (1.0 + sensor.unevenness * uneven)
+                + sensor.glare * (-reflected).exp();
+            let lit = sensor.exposure * lit;
             let normal: f64 = StandardNormal.sample(&mut random);
             let noisy = lit + sensor.noise * (DARK + (1.0 - DARK) * lit.max(0.0)).sqrt() * normal;
             let mut shade = noisy.clamp(0.0, 1.0);

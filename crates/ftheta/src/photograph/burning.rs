@@ -18,6 +18,10 @@ use ftheta_planner::render::Renderer;
 use ftheta_toolpath::lay::Order;
 use ftheta_twin::photograph::{Burn, Burner};
 use ftheta_twin::twin::{Twin, TwinOptions};
+use kurbo::Vec2;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
 
 /// Run-in of every line in lags of the servo, after which the beam is at its speed.
 const RUN_IN_LAGS: f64 = 8.0;
@@ -62,6 +66,19 @@ pub(super) fn burn(
         run.light = source.and_then(stroke_of).unwrap_or(usize::MAX);
     }
     Ok(burned)
+}
+
+/// Moves every run as a whole, as pulses do that come when they like.
+pub(super) fn jitter(burned: &mut Burn, jitter_mm: f64, seed: u64) {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6a69_7474_6572);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    for run in burned {
+        let off = Vec2::new(normal(), normal()) * jitter_mm;
+        for segment in &mut run.segments {
+            segment.from += off;
+            segment.to += off;
+        }
+    }
 }
 
 /// Runs in the dark that are long enough for the servo and for late light.

@@ -50,10 +50,13 @@ struct Process {
     line_j_mm: f64,
     /// Speed of what has none of its own, mm/s.
     slow_mm_s: f64,
+    /// Slowest and fastest line, mm/s, and by how much their dose is off.
+    speeds_mm_s: [f64; 2],
+    dose_slope: f64,
 }
 
 impl Process {
-    fn new(pattern: &Pattern, rule: Option<PowerRule>, machine: &Machine) -> Self {
+    fn new(pattern: &Pattern, options: &BurnOptions, machine: &Machine) -> Self {
         let shapes = pattern.features.iter().map(|feature| &feature.shape);
         let lines: Vec<LineProcess> = shapes
             .filter_map(|shape| match shape {
@@ -63,9 +66,13 @@ impl Process {
                 _ => None,
             })
             .collect();
-        let slow_mm_s = lines.iter().map(|line| line.speed_mm_s).fold(SPEED_MM_S, f64::min);
-        let rule = rule.unwrap_or_else(|| stated_or_proportional(&lines));
-        let mut found = Self { rule, fastest: 1.0, line_j_mm: 1.0, slow_mm_s };
+        let speeds = || lines.iter().map(|line| line.speed_mm_s);
+        let speeds_mm_s = [speeds().fold(f64::INFINITY, f64::min), speeds().fold(0.0, f64::max)];
+        let slow_mm_s = speeds_mm_s[0].min(SPEED_MM_S);
+        let rule = options.power.unwrap_or_else(|| stated_or_proportional(&lines));
+        let dose_slope = options.dose_slope;
+        let mut found =
+            Self { rule, fastest: 1.0, line_j_mm: 1.0, slow_mm_s, speeds_mm_s, dose_slope };
         if let Some(line) = lines.iter().max_by(|a, b| a.speed_mm_s.total_cmp(&b.speed_mm_s)) {
             found.fastest = found.ratio(line) / line.speed_mm_s;
         }
@@ -85,7 +92,10 @@ impl Process {
 
     /// Dose over that of the fastest line.
     fn dose(&self, line: &LineProcess) -> f64 {
-        self.ratio(line) / line.speed_mm_s / self.fastest.max(f64::MIN_POSITIVE)
+        let [slow, fast] = self.speeds_mm_s;
+        let share = if fast > slow { (line.speed_mm_s - slow) / (fast - slow) } else { 0.5 };
+        let off = 1.0 + self.dose_slope * (2.0 * share - 1.0);
+        off * self.ratio(line) / line.speed_mm_s / self.fastest.max(f64::MIN_POSITIVE)
     }
 }
 
@@ -103,7 +113,7 @@ pub(super) fn strokes(
     options: &BurnOptions,
     seed: u64,
 ) -> Strokes {
-    let process = Process::new(pattern, options.power, machine);
+    let process = Process::new(pattern, options, machine);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6700);
     let mut strokes = Strokes { all: Vec::new(), line_j_mm: process.line_j_mm, is_arm: Vec::new() };
     let mut put = |feature, curve, paint, speed_mm_s: f64, dose: f64, is_arm| {
