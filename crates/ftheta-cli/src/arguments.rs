@@ -1,6 +1,7 @@
 //! The command line: one struct per command, help texts with an example each.
 
 pub mod calibrate;
+pub mod calibrate_delay;
 pub mod field;
 pub mod pattern;
 pub mod photograph;
@@ -183,7 +184,8 @@ pub struct Jump {
     /// Period of the voltage, µs, instead of the machine's.
     #[arg(long, value_name = "P", value_parser = period)]
     pub period_us: Option<f64>,
-    /// Errors of the twin's plant that the law does not know of, as in f1=+0.03,kt=-0.02.
+    /// Errors of the twin's plant that the law does not know of, as in f1=+0.03,kt=-0.02; also
+    /// zeta, laser_on_us and laser_off_us.
     #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
           value_parser = mismatch, allow_hyphen_values = true)]
     pub mismatch: Mismatch,
@@ -310,7 +312,8 @@ pub struct Circle {
     /// Half of this is what a motor off the nominal one may be off after the run-in, µm.
     #[arg(long, value_name = "N", default_value = "10", value_parser = positive)]
     pub tolerance_um: f64,
-    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02.
+    /// Errors of the twin's plant that the plan does not know of, as in f1=+0.03,kt=-0.02; also
+    /// zeta, laser_on_us and laser_off_us.
     #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
           value_parser = mismatch, allow_hyphen_values = true)]
     pub mismatch: Mismatch,
@@ -411,7 +414,12 @@ fn number(text: &str) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err(format!("{value} is not finite")) }
 }
 
-/// Reads `f1=+0.03,kt=-0.02,zeta=0.0025`.
+/// Time by which light is late, ns, from µs.
+fn lateness(late_us: f64) -> Result<i64, String> {
+    Ok((within(late_us, -5000.0..=5000.0)? * 1e3).round() as i64)
+}
+
+/// Reads `f1=+0.03,kt=-0.02,zeta=0.0025,laser_on_us=85,laser_off_us=60`.
 fn mismatch(text: &str) -> Result<Mismatch, String> {
     let mut mismatch = Mismatch::default();
     for part in text.split(',').filter(|part| !part.trim().is_empty()) {
@@ -425,7 +433,13 @@ fn mismatch(text: &str) -> Result<Mismatch, String> {
             "f1" => mismatch.f1 = within(value, -0.5..=0.5).map_err(named)?,
             "kt" => mismatch.kt = within(value, -0.5..=0.5).map_err(named)?,
             "zeta" => mismatch.zeta = Some(within(value, 1e-5..=0.5).map_err(named)?),
-            other => return Err(format!("unknown key \"{other}\", known are f1, kt, zeta")),
+            "laser_on_us" => mismatch.late_ns[0] = lateness(value).map_err(named)?,
+            "laser_off_us" => mismatch.late_ns[1] = lateness(value).map_err(named)?,
+            other => {
+                return Err(format!(
+                    "unknown key \"{other}\", known are f1, kt, zeta, laser_on_us, laser_off_us"
+                ));
+            }
         }
     }
     Ok(mismatch)
@@ -444,11 +458,14 @@ mod tests {
     #[test]
     fn mismatch_is_read_or_refused() {
         let read = mismatch("f1=+0.03, kt=-0.02,zeta=0.0025").unwrap();
-        assert_eq!(read, Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025) });
+        let expected = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025), late_ns: [0; 2] };
+        assert_eq!(read, expected);
+        let read = mismatch("laser_on_us=85,laser_off_us=-0.5").unwrap();
+        assert_eq!(read.late_ns, [85_000, -500]);
         assert_eq!(mismatch("").unwrap(), Mismatch::default());
         for (text, expected) in [
             ("f1", "\"f1\" is not of the form key=value"),
-            ("f2=1", "unknown key \"f2\", known are f1, kt, zeta"),
+            ("f2=1", "unknown key \"f2\", known are f1, kt, zeta, laser_on_us, laser_off_us"),
             ("f1=nan", "NaN is not finite"),
             ("kt=0.6", "kt = 0.6 is outside -0.5 to 0.5"),
         ] {

@@ -11,6 +11,8 @@ pub struct Mismatch {
     pub kt: f64,
     /// Damping ratio of the mode; `None` leaves the machine file's.
     pub zeta: Option<f64>,
+    /// Light that appears, and goes, so much later than the machine file says, ns.
+    pub late_ns: [i64; 2],
 }
 
 impl Mismatch {

@@ -74,12 +74,14 @@ impl Twin {
     pub fn new(machine: &Machine, options: &TwinOptions) -> Result<Self, ServoError> {
         let beam = Beam::new(machine, &options.mismatch, options.seed)?;
         let period_ns = u64::from(machine.output.period_ns);
-        let latencies_ns = [machine.laser.on_latency_ns, machine.laser.off_latency_ns];
+        let [on_ns, off_ns] = options.mismatch.late_ns;
+        let latencies_ns =
+            [machine.laser.on_latency_ns + on_ns, machine.laser.off_latency_ns + off_ns];
         let lead_ns = latencies_ns.map(|ns| ns.min(0).unsigned_abs()).into_iter().fold(0, u64::max);
         let trace = Trace { step_ns: period_ns / beam.n_substeps() as u64, ..Trace::default() };
         Ok(Self {
             beam,
-            laser: LaserState::new(machine.laser.on_latency_ns, machine.laser.off_latency_ns),
+            laser: LaserState::new(latencies_ns[0], latencies_ns[1]),
             exposure: Exposure::new(options.pixel_mm),
             trace: Trace { points: vec![TracePoint::default()], ..trace },
             last: FieldPoint::default(),

@@ -5,6 +5,7 @@ use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
 use crate::photograph::PhotographError;
+use ftheta_calibrate::delay::error::DelayError;
 use ftheta_calibrate::error::CalibrateError;
 use ftheta_formats::cor_file::CorFileError;
 use ftheta_formats::correction_file::CorrectionFileError;
@@ -127,6 +128,14 @@ pub enum Error {
     /// A pattern cannot be made.
     #[error(transparent)]
     Pattern(#[from] PatternError),
+    /// A picture gives no delays.
+    #[error("{path}: {source}", path = path.display())]
+    Delay {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong.
+        source: DelayError,
+    },
     /// Measured marks give no calibration.
     #[error(transparent)]
     Calibrate(#[from] CalibrateError),
@@ -258,6 +267,10 @@ impl Error {
             Self::CorrectionFile { path, source } => in_file(path, source.fault()),
             Self::CorFile { path, source } => in_file(path, source.fault()),
             Self::Exchange { path, source } => in_file(path, source.fault()),
+            Self::Delay { path, source } => {
+                let (place, value, limit) = source.fault();
+                (format!("{}: {place}", path.display()), value, limit)
+            }
             Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
             Self::Units { path } => {
                 (path.display().to_string(), "no --units-per-mm".into(), "above 0".into())

@@ -8,6 +8,7 @@ pub mod atlas_store;
 pub mod camera;
 pub mod circle;
 pub mod convert;
+pub mod delay_calibration;
 pub mod error;
 pub mod exchange;
 pub mod field;

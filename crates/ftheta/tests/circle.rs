@@ -85,7 +85,7 @@ fn ellipses_are_as_long_as_they_are() {
 /// A motor that is not quite the nominal one is held by the servo.
 #[test]
 fn a_circle_stands_another_motor() {
-    let mismatch = Mismatch { f1: 0.03, kt: -0.005, zeta: None };
+    let mismatch = Mismatch { f1: 0.03, kt: -0.005, ..Mismatch::default() };
     let options = MarkOptions { mismatch, ..MarkOptions::default() };
     let ellipse = Round::Ellipse(at_centre([0.5, 0.5], 2000.0));
     let circled =

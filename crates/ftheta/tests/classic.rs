@@ -91,7 +91,7 @@ fn same_job_gives_same_plan_and_mismatch_only_touches_the_twin() {
     let (machine, recipe) = (preset("S14"), at_speed(1000.0, ClassicRecipe::default()));
     let first = run(&machine, &recipe, &classic()).unwrap();
     let second = run(&machine, &recipe, &classic()).unwrap();
-    let mismatch = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025) };
+    let mismatch = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025), ..Mismatch::default() };
     let options = MarkOptions { mismatch, noise_mm: 0.001, ..classic() };
     let other = run(&machine, &recipe, &options).unwrap();
     assert_eq!(first.plan.id(), second.plan.id());
@@ -250,7 +250,7 @@ proptest! {
         let job = drawing(&elements, &recipe);
         let options = MarkOptions {
             order: keep.then_some(Order::Keep),
-            mismatch: Mismatch { f1, kt, zeta: None },
+            mismatch: Mismatch { f1, kt, ..Mismatch::default() },
             ..classic()
         };
         let machine = preset(machine::PRESETS[preset_index]);

@@ -83,7 +83,7 @@ fn sensor_errors_move_the_beam() {
 #[test]
 fn beam_is_where_a_finer_simulation_puts_it() {
     let machine = machine();
-    let mismatch = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025) };
+    let mismatch = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025), ..Mismatch::default() };
     let mut twin = twin(&machine, mismatch);
     let word = 20_000;
     twin.push(&step_block(120, word)).unwrap();

@@ -14,8 +14,9 @@ const EXPLAINED: f64 = 0.9;
 const LOG_DOSE: [f64; 2] = [0.02, 7.0];
 /// Width by the spot's radius at a dose of three times the threshold.
 pub const USUAL_WIDTH: f64 = 1.482_3;
-/// Rows of a tip that are reckoned with, and weights of rows about the middle of a line.
+/// Rows of a tip that are reckoned with.
 const N_TIP: usize = 48;
+/// Rows that a profile along a line is made of: distance from the middle by half a width, weight.
 pub const ROW_WEIGHTS: [(f64, f64); 5] =
     [(-1.0, 0.135), (-0.5, 0.607), (0.0, 1.0), (0.5, 0.607), (1.0, 0.135)];
 

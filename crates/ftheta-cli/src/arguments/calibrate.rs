@@ -1,5 +1,6 @@
 //! Arguments of `ftheta calibrate` and `ftheta twin`.
 
+use super::calibrate_delay::CalibrateDelay;
 use super::photograph::TwinPhotograph;
 use super::{noise, positive};
 use clap::{Args, Subcommand, ValueEnum};
@@ -17,6 +18,8 @@ pub struct Calibrate {
 pub enum CalibrateAction {
     /// A correction table from measured marks.
     Field(CalibrateField),
+    /// The laser's delays from a picture of the delay pattern.
+    Delay(CalibrateDelay),
     /// Follow what has moved since a table was made, by gain and offset from a few marks.
     Drift(CalibrateDrift),
 }

@@ -1,0 +1,137 @@
+//! `ftheta calibrate delay`: the laser's delays from a picture.
+
+use crate::arguments::calibrate_delay::CalibrateDelay;
+use crate::json;
+use crate::screen::{note, say};
+use ftheta::calibrate::delay::Method;
+use ftheta::calibrate::delay::growth::Growth;
+use ftheta::delay_calibration::{DelayCalibration, calibrate_delay};
+use ftheta::formats::machine::to_toml;
+use ftheta::model::pattern::LaserDelays;
+use ftheta::output::write_file;
+use ftheta::{Error, camera, import, machines};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Measures delays, and writes them into a machine file if asked to.
+pub fn run(arguments: &CalibrateDelay, as_json: bool) -> Result<(), Error> {
+    let pattern = import::pattern(&arguments.pattern)?;
+    let name = arguments.machine.as_deref().or(pattern.machine.as_deref()).unwrap_or("S10");
+    let machine = machines::find(name)?;
+    let (source, picture) = match (&arguments.camera, &arguments.image) {
+        (Some(device), _) => (PathBuf::from(device), camera::take(device)?),
+        (None, image) => {
+            let path = image.clone().unwrap_or_default();
+            let picture = import::picture(&path)?;
+            (path, picture)
+        }
+    };
+    let found = calibrate_delay(&picture, &pattern, &machine, arguments.method.map(Into::into))
+        .map_err(|error| Error::Delay { path: source.clone(), source: error })?;
+    let (applied, left) = found.applied(&machine, arguments.apply.into());
+    let beside = arguments.out.as_deref().or(arguments.image.as_deref());
+    let report = beside.unwrap_or(Path::new("")).with_file_name("calibration.html");
+    let mut files = Vec::new();
+    if let Some(out) = &arguments.out {
+        write_file(out, to_toml(&applied).as_bytes())?;
+        files.push(("machine", out.display().to_string()));
+    }
+    let page = found.report(&picture.picture, &pattern, &machine.name);
+    write_file(&report, page.as_bytes())?;
+    files.push(("report", report.display().to_string()));
+    match as_json {
+        true => json::print(&object(&found, left, &machine.name, &files)),
+        false => print(&found, left, &files),
+    }
+    Ok(())
+}
+
+fn object(
+    found: &DelayCalibration,
+    left: LaserDelays,
+    machine: &str,
+    files: &[(&str, String)],
+) -> Value {
+    let delays = &found.delays;
+    let [on_sd, off_sd, mean_sd] = delays.sd_s.map(|s| s * 1e6);
+    let scene = &delays.scene;
+    let rejected: Vec<Value> = delays
+        .lines
+        .iter()
+        .flat_map(|line| line.ends.iter().zip(["start", "stop"]).map(move |end| (line, end)))
+        .filter_map(|(line, (end, which))| {
+            let why = end.reject?.reason();
+            Some(json!({"id": line.id, "end": which, "why": why}))
+        })
+        .collect();
+    json!({
+        "machine": machine,
+        "method": if delays.method == Method::Comb { "comb" } else { "rectangle" },
+        "tau_on_us": delays.tau_on_s * 1e6,
+        "tau_off_us": delays.tau_off_s * 1e6,
+        "tau_on_sd_us": on_sd,
+        "tau_off_sd_us": off_sd,
+        "tau_mean_us": 0.5e6 * (delays.tau_on_s + delays.tau_off_s),
+        "tau_mean_sd_us": mean_sd,
+        "set": {"on_us": found.set.on_us, "off_us": found.set.off_us},
+        "on_us": found.settings.on_us,
+        "off_us": found.settings.off_us,
+        "left": {"on_us": left.on_us, "off_us": left.off_us},
+        "acceleration_m_s2": delays.acceleration_mm_s2.map(|a| a * 1e-3),
+        "growth_model": matches!(delays.growth, Growth::Modelled { .. }),
+        "patent": delays.patent_s.map(|[on, off]| json!({
+            "tau_on_us": on * 1e6,
+            "tau_off_us": off * 1e6,
+            "bias_us": (on - delays.tau_on_s) * 1e6,
+        })),
+        "lines": delays.lines.len(),
+        "rejected": rejected,
+        "rms_um": delays.rms_mm * 1e3,
+        "picture": {
+            "um_per_px": scene.mm_per_px * 1e3,
+            "blur_px": scene.blur_px,
+            "contrast": scene.contrast,
+            "noise": scene.noise,
+            "view_rms_px": scene.view_rms_px,
+            "references": scene.references,
+            "upside_down": scene.upside_down,
+            "bright": scene.bright,
+        },
+        "advice": found.advice,
+        "warnings": found.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "files": json::files(files),
+    })
+}
+
+fn print(found: &DelayCalibration, left: LaserDelays, files: &[(&str, String)]) {
+    for warning in &found.warnings {
+        note!("warning: {warning}");
+    }
+    let delays = &found.delays;
+    let [on_sd, off_sd, mean_sd] = delays.sd_s.map(|s| s * 1e6);
+    let [on, off] = [delays.tau_on_s * 1e6, delays.tau_off_s * 1e6];
+    say!("late     on {on:.2} ± {on_sd:.2} µs, off {off:.2} ± {off_sd:.2} µs");
+    say!("mean     {:.2} ± {mean_sd:.2} µs", 0.5 * (on + off));
+    if let Some([patent_on, patent_off]) = delays.patent_s {
+        say!("patent   on {patent_on:.2} µs, off {patent_off:.2} µs by its own formula");
+    }
+    let LaserDelays { on_us, off_us } = found.settings;
+    say!("set      on {on_us:.2} µs, off {off_us:.2} µs, positive is later");
+    if left.on_us.abs().max(left.off_us.abs()) > 1e-3 {
+        say!("left     on {:.2} µs, off {:.2} µs with --apply mirrors", left.on_us, left.off_us);
+    }
+    let ends = delays.lines.iter().flat_map(|line| line.ends);
+    let n_rejected = ends.filter(|end| end.reject.is_some()).count();
+    say!(
+        "lines    {} at {:.1} µm/px, {n_rejected} ends left out, {:.1} µm rms",
+        delays.lines.len(),
+        delays.scene.mm_per_px * 1e3,
+        delays.rms_mm * 1e3
+    );
+    for advice in &found.advice {
+        say!("next     {advice}");
+    }
+    for (kind, path) in files {
+        say!("{kind:8} {path}");
+    }
+}
