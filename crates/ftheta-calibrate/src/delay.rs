@@ -3,6 +3,7 @@
 //! [`estimate`] is the entry: a picture and its pattern in, [`Delays`] out. What a picture shows is
 //! net of the mirrors' lag, which cannot be seen in one.
 
+mod coarse;
 pub mod error;
 pub mod growth;
 mod layout;

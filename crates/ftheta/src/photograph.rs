@@ -13,6 +13,7 @@ use ftheta_model::picture::Picture;
 use ftheta_model::tag;
 use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::head::Head;
+use ftheta_twin::hidden_head::hidden_head;
 use ftheta_twin::mismatch::Mismatch;
 use ftheta_twin::photograph::{
     Camera, CameraOptions, Look, Print, Printer, Scene, Segment, Sensor, expose,
@@ -31,6 +32,8 @@ const N_PIXELS_MAX: usize = 100_000_000;
 /// Brightness of a bare plate, of the burned one, and of white and black ink.
 const DARK_ON_BRIGHT: [f64; 4] = [0.78, 0.16, 0.78, 0.10];
 const BRIGHT_ON_DARK: [f64; 4] = [0.22, 0.80, 0.78, 0.08];
+/// Unevenness of anodised aluminium: brightness, threshold.
+pub const TEXTURE: [f64; 2] = [0.03, 0.05];
 /// What a caliper reads beside the truth, mm rms.
 const CALIPER_MM: f64 = 0.02;
 
@@ -93,6 +96,52 @@ pub struct PhotographOptions {
     pub sheet_lies: [f64; 3],
     /// Unevenness of the material, relative: brightness, threshold.
     pub texture: [f64; 2],
+}
+
+impl PhotographOptions {
+    /// A phone over anodised aluminium, and a machine that is as its file says but for a head with
+    /// errors of its own: what `ftheta twin photograph` takes unless told otherwise.
+    pub fn usual(true_machine: &Machine, seed: u64) -> Self {
+        Self {
+            burn: BurnOptions {
+                true_machine: true_machine.clone(),
+                head: Some(hidden_head(&true_machine.optics, seed)),
+                table: None,
+                mismatch: Mismatch::default(),
+                late_ns: [0; 2],
+                dose: 3.0,
+                power: None,
+                dose_slope: 0.0,
+                jitter_mm: 0.001,
+                spot_diameter_mm: None,
+                overburn: 1.0,
+                missing: 0.0,
+            },
+            camera: CameraOptions {
+                pixel_mm: None,
+                megapixels: None,
+                tilt_deg: None,
+                turn_deg: 0.0,
+                mirrored: false,
+                distortion: 1.0,
+                seed,
+            },
+            sensor: Sensor {
+                blur_px: 0.8,
+                noise: 0.02,
+                exposure: 1.0,
+                unevenness: 1.0,
+                glare: 0.0,
+                n_dirt: 0,
+                gamma: 1.0,
+                seed,
+            },
+            bright: false,
+            print_error: None,
+            sheet_lies: [0.0; 3],
+            texture: TEXTURE,
+        }
+    }
 }
 
 /// A photograph, and what is true of it.

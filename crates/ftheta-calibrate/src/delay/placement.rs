@@ -1,10 +1,10 @@
 //! Which stroke of a picture is which line of the pattern, whichever way the picture was taken.
 
+use super::coarse::Coarse;
 use super::error::DelayError;
 use super::layout::Layout;
 use super::strokes::{Stroke, Strokes};
 use ftheta_model::picture::PixelPoint;
-use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Strokes within this of the main direction run along it, within that of its normal across, rad.
@@ -16,16 +16,25 @@ const DIRECTION_STEP_RAD: f64 = 0.01;
 const ROW_GATE: f64 = 0.3;
 /// Rows of the pattern and of the picture with which they may begin to agree.
 const N_BEGIN: usize = 8;
+/// Rows over which the scale is taken, and up to which all scales are tried.
+const N_BACK: usize = 8;
+const N_FEW: usize = 6;
 /// Share of the pattern's lines that has to be found.
 const FOUND_SHARE: f64 = 0.8;
-/// Strokes along the lines beyond the pattern's, as a share of them, that are not another pattern.
+/// Strokes along the lines beyond the pattern's, as a share of them and more, that are not
+/// another pattern.
 const EXTRA_SHARE: f64 = 0.25;
+const N_EXTRA: f64 = 2.0;
 /// Pieces of a line are no farther apart than this part of the longer one.
 const GAP: f64 = 0.25;
+/// Strokes of this part of each other's length are about as long.
+const AS_LONG: f64 = 0.6;
 /// Columns have to span this part of the rows' extent.
 const COLUMN_LENGTH: f64 = 0.6;
-/// Columns agree with the pattern's to this part of their distance, before perspective is known.
-const COLUMN_GATE: f64 = 0.06;
+/// Weight of a burned reference along the lines by that of all lines.
+const REFERENCE: f64 = 0.05;
+/// The best way leaves no more than this, px.
+const LEFT_PX: f64 = 12.0;
 /// The right way to lay the pattern on the picture is better than any other by this factor.
 const CLEARLY: f64 = 2.0;
 /// Ways that leave up to so many times the least are about as good.
@@ -80,6 +89,8 @@ struct Found {
 struct Frame {
     direction_rad: f64,
     rows: Vec<Found>,
+    /// Strokes beside those of the rows, about as long.
+    n_beside: usize,
     columns: Vec<Found>,
 }
 
@@ -117,6 +128,8 @@ fn place_along(
     let frame = Frame::new(strokes, direction);
     let n_lines = layout.rows.len();
     let limit = (FOUND_SHARE * n_lines as f64).ceil() as usize;
+    let n_found = frame.rows.len() + frame.n_beside;
+    let most = n_lines as f64 * (1.0 + EXTRA_SHARE) + N_EXTRA;
     let columns = !layout.columns_mm.is_empty() && frame.columns.len() == layout.columns_mm.len();
     let mut hypotheses: Vec<Hypothesis> = Vec::new();
     for flip in [[false, true], [true, false], [false, false], [true, true]] {
@@ -130,15 +143,19 @@ fn place_along(
     }
     hypotheses.sort_by(|a, b| a.left_px.total_cmp(&b.left_px));
     let Some(best) = hypotheses.first() else {
-        let n_found = frame.n_agreeing(layout);
-        let n_extra = frame.rows.len();
-        return Err(match n_found < limit {
-            true => DelayError::LinesMissing { n_found, n_lines, n_strokes: n_extra, limit },
+        let n_agreeing = frame.n_agreeing(layout);
+        return Err(match n_agreeing < limit {
+            true => {
+                DelayError::LinesMissing { n_found: n_agreeing, n_lines, n_strokes: n_found, limit }
+            }
             false => DelayError::NotThePattern { n_lines },
         });
     };
-    if frame.rows.len() as f64 > n_lines as f64 * (1.0 + EXTRA_SHARE) + 2.0 {
-        return Err(DelayError::TooManyLines { n_found: frame.rows.len(), n_lines });
+    if n_found as f64 > most {
+        return Err(DelayError::TooManyLines { n_found, n_lines });
+    }
+    if best.left_px > LEFT_PX {
+        return Err(DelayError::NotThePattern { n_lines });
     }
     if let Some(second) = hypotheses.get(1) {
         let (least, other) = (best.left_px.max(COARSE_PX), second.left_px.max(COARSE_PX));
@@ -218,14 +235,14 @@ impl Frame {
                 Found { across_px: middle, along_px, width_px: s.width_px }
             })
             .collect();
-        let rows = in_rows(rows);
+        let (rows, n_beside) = in_rows(rows);
         let span = match rows[..] {
             [first, .., last] => last.across_px - first.across_px,
             _ => 0.0,
         };
-        let mut columns = in_rows(columns);
+        let (mut columns, _) = in_rows(columns);
         columns.retain(|column| column.length_px() > COLUMN_LENGTH * span);
-        Self { direction_rad, rows, columns }
+        Self { direction_rad, rows, n_beside, columns }
     }
 
     /// The pattern laid on the frame one way; `None` if it does not fit.
@@ -259,49 +276,25 @@ impl Frame {
 
     /// Ways to pair rows of the picture and the pattern in order, each with its scale.
     fn pairings(&self, layout: &Layout, flip: bool) -> Vec<(Vec<(usize, usize)>, f64)> {
-        let (n_found, n_rows) = (self.rows.len(), layout.rows.len());
-        let sign = if flip { -1.0 } else { 1.0 };
+        let n_rows = layout.rows.len();
         let order = |index: usize| if flip { n_rows - 1 - index } else { index };
-        let at_mm = |index: usize| sign * layout.rows[order(index)].across_mm;
+        let sign = if flip { -1.0 } else { 1.0 };
+        let rows_mm: Vec<f64> =
+            (0..n_rows).map(|index| sign * layout.rows[order(index)].across_mm).collect();
+        let found_px: Vec<f64> = self.rows.iter().map(|row| row.across_px).collect();
         let mut all: Vec<(Vec<(usize, usize)>, f64)> = Vec::new();
-        if n_found < 2 || n_rows < 2 {
-            return all;
-        }
-        let mut gaps: Vec<f64> =
-            self.rows.windows(2).map(|pair| pair[1].across_px - pair[0].across_px).collect();
-        gaps.sort_by(f64::total_cmp);
-        let mut gaps_mm: Vec<f64> =
-            (1..n_rows).map(|index| at_mm(index) - at_mm(index - 1)).collect();
-        gaps_mm.sort_by(f64::total_cmp);
-        let scale = gaps_mm[gaps_mm.len() / 2] / gaps[gaps.len() / 2];
-        for first_found in 0..n_found.min(N_BEGIN) {
-            for first_row in 0..n_rows.min(N_BEGIN) {
-                let (mut pairs, mut scale) = (vec![(first_found, first_row)], scale);
-                for found in first_found + 1..n_found {
-                    let (last_found, last_row) = pairs[pairs.len() - 1];
-                    let moved_px = self.rows[found].across_px - self.rows[last_found].across_px;
-                    let expected_mm = at_mm(last_row) + moved_px * scale;
-                    let off_mm = |index: usize| (at_mm(index) - expected_mm).abs();
-                    let nearest = (last_row + 1..n_rows)
-                        .take_while(|&index| at_mm(index) < expected_mm + layout.pitch_mm())
-                        .min_by(|&a, &b| off_mm(a).total_cmp(&off_mm(b)));
-                    let Some(row) =
-                        nearest.filter(|&row| off_mm(row) < ROW_GATE * layout.pitch_mm())
-                    else {
-                        continue;
-                    };
-                    pairs.push((found, row));
-                    // Perspective changes the scale slowly.
-                    let back = pairs[pairs.len().saturating_sub(8)];
-                    let long_px = self.rows[found].across_px - self.rows[back.0].across_px;
-                    scale = (at_mm(row) - at_mm(back.1)) / long_px;
-                }
-                let (first, last) = (pairs[0], pairs[pairs.len() - 1]);
-                let span_px = self.rows[last.0].across_px - self.rows[first.0].across_px;
-                let scale = (at_mm(last.1) - at_mm(first.1)) / span_px;
-                let pairs = pairs.into_iter().map(|(found, row)| (found, order(row))).collect();
-                if scale.is_finite() && !all.iter().any(|(known, _)| *known == pairs) {
-                    all.push((pairs, scale));
+        for scale in scales(&rows_mm, &found_px) {
+            for first_found in 0..found_px.len().min(N_BEGIN) {
+                for first_row in 0..n_rows.min(N_BEGIN) {
+                    let begin = (first_found, first_row);
+                    let pairs = paired(&rows_mm, &found_px, begin, scale, layout.pitch_mm());
+                    let (first, last) = (pairs[0], pairs[pairs.len() - 1]);
+                    let span_px = found_px[last.0] - found_px[first.0];
+                    let scale = (rows_mm[last.1] - rows_mm[first.1]) / span_px;
+                    let pairs = pairs.into_iter().map(|(found, row)| (found, order(row))).collect();
+                    if scale.is_finite() && !all.iter().any(|(known, _)| *known == pairs) {
+                        all.push((pairs, scale));
+                    }
                 }
             }
         }
@@ -314,58 +307,48 @@ impl Frame {
         both.map(|(pairs, _)| pairs.len()).max().unwrap_or(0)
     }
 
-    /// What is left of coarse ends, px rms, when delays, growth and the pattern's place are fitted.
+    /// What is left of coarse ends, px rms, when delays, growth and the view are fitted.
     fn left_px(&self, layout: &Layout, hypothesis: &Hypothesis, columns: bool) -> Option<f64> {
         let sign = if hypothesis.flip[0] { -1.0 } else { 1.0 };
         let scale = hypothesis.mm_per_px;
-        let (mut rows, mut values): (Vec<[f64; 6]>, Vec<f64>) = (Vec::new(), Vec::new());
         let top = layout.rows.iter().filter_map(|row| row.process.map(|p| p.speed_mm_s));
         let fastest = top.fold(0.0, f64::max);
+        let mut coarse = Coarse::new(scale);
+        // What does not move counts more than what does.
+        let reference = (REFERENCE * hypothesis.pairs.len() as f64).sqrt();
         for &(found, row) in &hypothesis.pairs {
             let row = &layout.rows[row];
-            let Some(process) = row.process else { continue };
             let [a, b] = self.rows[found].along_px.map(|along_px| sign * along_px * scale);
             let (low, high) = (a.min(b), a.max(b));
             let sense = row.sense();
             let ends = if sense > 0.0 { [low, high] } else { [high, low] };
-            let speed = process.speed_mm_s / fastest;
             for (index, end) in ends.into_iter().enumerate() {
-                let [start, stop] = if index == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
+                let known = [row.ends_mm[index], row.across_mm];
+                let late = row.process.map_or(0.0, |process| sense * process.speed_mm_s / fastest);
+                let delays = if index == 0 { [late, 0.0] } else { [0.0, late] };
                 let growth = if index == 0 { -sense } else { sense };
-                let late = sense * speed;
-                rows.push([1.0, row.across_mm, start * late, stop * late, growth, 0.0]);
-                values.push(end - row.ends_mm[index]);
+                let weight = if row.process.is_none() { reference } else { 1.0 };
+                coarse.add(weight, known, [delays[0], delays[1], growth], end);
             }
         }
+        // References do not move, so they weigh as much as all lines together.
+        let weight = (coarse.len() as f64).sqrt();
         if columns {
             let found = self.columns.iter().map(|column| sign * column.across_px * scale);
             let mut found: Vec<f64> = found.collect();
             found.sort_by(f64::total_cmp);
-            let (first, last) = (layout.columns_mm[0], layout.columns_mm[found.len() - 1]);
-            for (found, known) in found.iter().zip(&layout.columns_mm) {
-                // Columns do not lie, so they weigh as much as all lines together.
-                let weight = (rows.len() as f64).sqrt();
-                let share =
-                    0.5 * (layout.rows[0].across_mm + layout.rows[layout.rows.len() - 1].across_mm);
-                rows.push([
-                    weight,
-                    weight * share,
-                    0.0,
-                    0.0,
-                    0.0,
-                    weight * (known - 0.5 * (first + last)),
-                ]);
-                values.push(weight * (found - known));
+            let (first, last) = (&layout.rows[0], &layout.rows[layout.rows.len() - 1]);
+            let middle_mm = 0.5 * (first.across_mm + last.across_mm);
+            for (&found, &known) in found.iter().zip(&layout.columns_mm) {
+                coarse.add(weight, [known, middle_mm], [0.0; 3], found);
             }
         }
-        // The scale along, from columns, is held near that across.
-        rows.push([0.0, 0.0, 0.0, 0.0, 0.0, (last_or(layout) / COLUMN_GATE).max(1.0)]);
-        values.push(0.0);
-        let matrix = DMatrix::from_fn(rows.len(), 6, |row, column| rows[row][column]);
-        let values = DVector::from_vec(values);
-        let found = matrix.clone().svd(true, true).solve(&values, 1e-9).ok()?;
-        let left = (matrix * found - &values).norm() / (values.len() as f64).sqrt();
-        Some(left / scale)
+        for (index, row) in layout.rows.iter().enumerate() {
+            if !hypothesis.pairs.iter().any(|&(_, paired)| paired == index) {
+                coarse.add_unseen(if row.process.is_none() { reference } else { 1.0 });
+            }
+        }
+        coarse.left_px()
     }
 
     fn placement(&self, layout: &Layout, best: &Hypothesis, columns: bool) -> Placement {
@@ -404,16 +387,58 @@ impl Frame {
     }
 }
 
-/// Half of what the columns span, mm.
-fn last_or(layout: &Layout) -> f64 {
-    match layout.columns_mm[..] {
-        [first, .., last] => 0.5 * (last - first),
-        _ => 0.0,
+/// Scales to begin with, mm/px: that of the usual distance of rows, and where rows are few all that
+/// two of them can have.
+fn scales(rows_mm: &[f64], found_px: &[f64]) -> Vec<f64> {
+    let gaps = |places: &[f64]| {
+        let mut gaps: Vec<f64> = places.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        gaps.sort_by(f64::total_cmp);
+        gaps
+    };
+    let (gaps_mm, gaps_px) = (gaps(rows_mm), gaps(found_px));
+    if gaps_mm.is_empty() || gaps_px.is_empty() {
+        return Vec::new();
     }
+    let mut scales = vec![gaps_mm[gaps_mm.len() / 2] / gaps_px[gaps_px.len() / 2]];
+    if rows_mm.len() <= N_FEW && found_px.len() <= 2 * N_FEW {
+        let longest_mm = rows_mm[rows_mm.len() - 1] - rows_mm[0];
+        for (index, from) in found_px.iter().enumerate() {
+            scales.extend(found_px[index + 1..].iter().map(|to| longest_mm / (to - from)));
+        }
+    }
+    scales
 }
 
-/// Joins what lies in one row.
-fn in_rows(mut found: Vec<Found>) -> Vec<Found> {
+/// Pairs rows in order from a first pair on, each with the nearest that is still free.
+fn paired(
+    rows_mm: &[f64],
+    found_px: &[f64],
+    begin: (usize, usize),
+    mut scale: f64,
+    pitch_mm: f64,
+) -> Vec<(usize, usize)> {
+    let mut pairs = vec![begin];
+    for found in begin.0 + 1..found_px.len() {
+        let (last_found, last_row) = pairs[pairs.len() - 1];
+        let expected_mm = rows_mm[last_row] + (found_px[found] - found_px[last_found]) * scale;
+        let off_mm = |index: usize| (rows_mm[index] - expected_mm).abs();
+        let nearest = (last_row + 1..rows_mm.len())
+            .take_while(|&index| rows_mm[index] < expected_mm + pitch_mm)
+            .min_by(|&a, &b| off_mm(a).total_cmp(&off_mm(b)));
+        let Some(row) = nearest.filter(|&row| off_mm(row) < ROW_GATE * pitch_mm) else {
+            continue;
+        };
+        pairs.push((found, row));
+        // Perspective changes the scale slowly.
+        let back = pairs[pairs.len().saturating_sub(N_BACK)];
+        scale = (rows_mm[row] - rows_mm[back.1]) / (found_px[found] - found_px[back.0]);
+    }
+    pairs
+}
+
+/// Joins what lies in one row, and counts what stands beside, about as long.
+fn in_rows(mut found: Vec<Found>) -> (Vec<Found>, usize) {
+    let mut n_beside = 0;
     found.sort_by(|a, b| a.across_px.total_cmp(&b.across_px));
     let mut rows: Vec<Found> = Vec::new();
     for piece in found {
@@ -424,7 +449,10 @@ fn in_rows(mut found: Vec<Found>) -> Vec<Found> {
             let gap =
                 (piece.along_px[0] - row.along_px[1]).max(row.along_px[0] - piece.along_px[1]);
             let longer = piece.length_px() > row.length_px();
-            if gap > GAP * row.length_px().max(piece.length_px()) {
+            let [short, long] = [row.length_px(), piece.length_px()];
+            let (short, long) = (short.min(long), short.max(long));
+            if gap > GAP * long {
+                n_beside += usize::from(short > AS_LONG * long);
                 if longer {
                     *row = piece;
                 }
@@ -439,7 +467,7 @@ fn in_rows(mut found: Vec<Found>) -> Vec<Found> {
         }
         rows.push(piece);
     }
-    rows
+    (rows, n_beside)
 }
 
 impl Found {

@@ -6,13 +6,17 @@
 //! from the width of the lines and the spot. Source: optics.md D.2.
 
 use super::error::DelayError;
-use super::growth::{Growth, USUAL_WIDTH, seen_growth};
+use super::growth::{Growth, SpeedWidth, USUAL_WIDTH, seen_growth};
 use super::layout::Layout;
-use super::{Delays, LineEndSeen, Method, Observed};
+use super::measured::Reject;
+use super::{Delays, LineEndSeen, Method, Observed, SceneFacts};
 
-/// What the growth is uncertain by, as a part of the width: with a spot from a data sheet, and
-/// without.
+/// What the growth is uncertain by, as a part of the width: with a spot from a data sheet, without,
+/// and where the width cannot be seen for blur.
 const GROWTH_SD: [f64; 2] = [0.03, 0.08];
+const GROWTH_SD_UNSEEN: f64 = 0.2;
+/// A width is seen from so many times the softness of edges on.
+const SEEN_WIDTH: f64 = 2.7;
 /// Largest dose over threshold that is reckoned with, as a logarithm.
 const LOG_DOSE_MAX: f64 = 7.0;
 
@@ -37,14 +41,17 @@ pub fn rectangle(
     let ends = observed.line_ends(layout, speeds);
     let n_free = ends.len();
     if n_free < n_ends {
-        return Err(DelayError::NoGap { n_free, n_ends });
+        let all = observed.lines.iter().flat_map(|line| line.ends);
+        let other = all.filter_map(Result::err).find(|&reject| reject != Reject::AtReference);
+        let n_rejected = n_ends - n_free;
+        return Err(match other.map(Reject::reason) {
+            Some(reason) => DelayError::Rejected { n_rejected, n_ends, limit: 0, reason },
+            None => DelayError::NoGap { n_free, n_ends },
+        });
     }
     let widths = observed.widths_by_speed(layout, speeds);
-    let width_mm =
-        widths.iter().map(|width| width.width_mm).sum::<f64>() / widths.len().max(1) as f64;
-    let spot_mm = spot_radius_mm.unwrap_or(width_mm / USUAL_WIDTH);
-    let log_dose = (0.5 * (width_mm / spot_mm).powi(2)).min(LOG_DOSE_MAX);
-    let growth_mm = seen_growth(spot_mm, log_dose.exp(), &observed.look());
+    let Growing { spot_mm, width_mm, growth_mm, sd_mm: growth_sd_mm } =
+        growing(&observed, &widths, spot_radius_mm);
     // How late each end is, and what the patent would say.
     let late = |on: bool, extra_mm: f64| {
         let outward = if on { -1.0 } else { 1.0 };
@@ -59,7 +66,6 @@ pub fn rectangle(
     let patent_s = [true, false].map(|on| mean(&late(on, 0.5 * width_mm)));
     let speed = mean(speeds);
     let edge_sd_s = observed.facts.mm_per_px * 0.1 / speed / (0.5 * on.len().max(1) as f64).sqrt();
-    let growth_sd_mm = GROWTH_SD[usize::from(spot_radius_mm.is_none())] * width_mm;
     let sd_s = (growth_sd_mm / speed).hypot(edge_sd_s);
     let lines = observed.lines.iter().enumerate().map(|(index, line)| {
         let row = &layout.rows[line.row];
@@ -97,4 +103,30 @@ pub fn rectangle(
         widths,
         scene: observed.facts,
     })
+}
+
+/// How far ends grow, and how well that is known.
+struct Growing {
+    spot_mm: f64,
+    width_mm: f64,
+    growth_mm: f64,
+    sd_mm: f64,
+}
+
+fn growing(observed: &Observed, widths: &[SpeedWidth], spot_radius_mm: Option<f64>) -> Growing {
+    let width_mm =
+        widths.iter().map(|width| width.width_mm).sum::<f64>() / widths.len().max(1) as f64;
+    let SceneFacts { blur_px, mm_per_px, .. } = observed.facts;
+    let seen = width_mm > SEEN_WIDTH * blur_px * mm_per_px;
+    let (width_mm, sd) = match spot_radius_mm {
+        // What looks wide is blur: the usual dose is the better guess.
+        Some(spot_mm) if !seen => (USUAL_WIDTH * spot_mm, GROWTH_SD_UNSEEN),
+        Some(_) => (width_mm, GROWTH_SD[0]),
+        None if !seen => (width_mm.max(blur_px * mm_per_px), GROWTH_SD_UNSEEN),
+        None => (width_mm, GROWTH_SD[1]),
+    };
+    let spot_mm = spot_radius_mm.unwrap_or(width_mm / USUAL_WIDTH);
+    let log_dose = (0.5 * (width_mm / spot_mm).powi(2)).min(LOG_DOSE_MAX);
+    let growth_mm = seen_growth(spot_mm, log_dose.exp(), &observed.look());
+    Growing { spot_mm, width_mm, growth_mm, sd_mm: sd * width_mm }
 }

@@ -7,6 +7,8 @@ use ftheta_model::picture::{Picture, PixelPoint};
 /// Side of the surroundings that a pixel is held against, by the picture's shorter side; least, px.
 const SURROUNDINGS: f64 = 1.0 / 12.0;
 const SURROUNDINGS_MIN_PX: usize = 24;
+/// Shade that is made up for, by the picture's mean.
+const SHADE_MIN: f32 = 0.25;
 /// Share of the pixels that have to be beyond the contrast.
 const CONTRAST_SHARE: f64 = 0.003;
 /// A stroke differs by this part of the contrast, and by so many deviations of the noise.
@@ -16,9 +18,10 @@ const THRESHOLD_NOISE: f64 = 4.0;
 const CONTRAST_NOISE: f64 = 6.0;
 /// Least contrast, of full scale.
 const CONTRAST_MIN: f64 = 0.02;
-/// Noise by the contrast from which a picture is smoothed, and what that leaves of the noise.
+/// Noise by the contrast from which a picture is smoothed, and what one to three rounds of that
+/// leave of the noise.
 const NOISY: f64 = 0.05;
-const SMOOTHED: f64 = 0.375;
+const SMOOTHED: [f64; 3] = [0.375, 0.273, 0.226];
 /// A stroke is so many times as long as wide, and at least so long.
 const ELONGATION: f64 = 5.0;
 const LENGTH_MIN_PX: f64 = 15.0;
@@ -62,11 +65,14 @@ pub fn strokes(picture: &Picture) -> Result<Strokes, DelayError> {
     let mut off = difference(picture);
     let (mut low, mut high) = extremes(&off);
     let mut noise_left = noise;
-    if noise > NOISY * high.max(-low) {
+    for share in SMOOTHED {
+        if noise_left < NOISY * high.max(-low) {
+            break;
+        }
         // Lines would fall to pieces; a little of their depth is the smaller loss.
         smooth(&mut off, picture.width());
         (low, high) = extremes(&off);
-        noise_left *= SMOOTHED;
+        noise_left = share * noise;
     }
     let bright = high > -low;
     let contrast = high.max(-low);
@@ -102,7 +108,7 @@ fn noise(picture: &Picture) -> f64 {
     f64::from(median) / (0.674_49 * std::f64::consts::SQRT_2)
 }
 
-/// Every pixel less the mean around it.
+/// Every pixel less the mean around it, as under even light.
 fn difference(picture: &Picture) -> Vec<f32> {
     let (width, height) = (picture.width(), picture.height());
     let side = (SURROUNDINGS * width.min(height) as f64) as usize;
@@ -111,7 +117,14 @@ fn difference(picture: &Picture) -> Vec<f32> {
     // Columns as rows, so that memory is read in order.
     let turned = transposed(&along, width);
     let means = transposed(&running_means(&turned, height, reach), height);
-    picture.values().iter().zip(means).map(|(value, mean)| value - mean).collect()
+    let sum: f64 = means.iter().map(|&mean| f64::from(mean)).sum();
+    let overall = (sum / means.len() as f64) as f32;
+    let least = SHADE_MIN * overall;
+    let of_pixel = |(value, mean): (&f32, f32)| (value - mean) * (overall / mean.max(least));
+    if overall <= 0.0 {
+        return vec![0.0; means.len()];
+    }
+    picture.values().iter().zip(means).map(of_pixel).collect()
 }
 
 /// Every value becomes a mean of its neighbours, 1 2 1 along rows and columns.

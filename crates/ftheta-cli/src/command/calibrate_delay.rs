@@ -112,7 +112,7 @@ fn print(found: &DelayCalibration, left: LaserDelays, files: &[(&str, String)]) 
     let [on, off] = [delays.tau_on_s * 1e6, delays.tau_off_s * 1e6];
     say!("late     on {on:.2} ± {on_sd:.2} µs, off {off:.2} ± {off_sd:.2} µs");
     say!("mean     {:.2} ± {mean_sd:.2} µs", 0.5 * (on + off));
-    if let Some([patent_on, patent_off]) = delays.patent_s {
+    if let Some([patent_on, patent_off]) = delays.patent_s.map(|both| both.map(|s| s * 1e6)) {
         say!("patent   on {patent_on:.2} µs, off {patent_off:.2} µs by its own formula");
     }
     let LaserDelays { on_us, off_us } = found.settings;

@@ -7,15 +7,12 @@ use crate::screen::say;
 use ftheta::model::machine::Machine;
 use ftheta::output::{PictureFormat, write_file, write_picture};
 use ftheta::photograph::truth::{TruePlace, Truth};
-use ftheta::photograph::{BurnOptions, Photograph, PhotographOptions, photograph};
+use ftheta::photograph::{BurnOptions, Photograph, PhotographOptions, TEXTURE, photograph};
 use ftheta::twin::hidden_head::hidden_head;
 use ftheta::twin::mismatch::Mismatch;
 use ftheta::twin::photograph::{CameraOptions, Sensor};
 use ftheta::{Error, import, machines, tables};
 use serde_json::{Value, json};
-
-/// Unevenness of anodised aluminium: brightness, threshold.
-const TEXTURE: [f64; 2] = [0.03, 0.05];
 
 /// Takes a photograph.
 pub fn run(arguments: &TwinPhotograph, as_json: bool) -> Result<(), Error> {

@@ -22,6 +22,8 @@ const PITCH_MIN_MM: f64 = 0.4;
 const REFERENCE_GAP_MM: f64 = 0.6;
 /// Speed of references by the slowest line's: slow, and gone over both ways.
 const REFERENCE_SPEED: f64 = 0.5;
+/// Lines each way that stand together.
+const N_BLOCK: usize = 2;
 /// Size of labels, mm.
 const LETTER_MM: f64 = 1.2;
 /// Speeds that can be marked, mm/s, lines of a speed each way, lengths of a line, mm, and delays
@@ -149,8 +151,9 @@ fn comb(options: &DelayOptions, spot_mm: f64) -> (Vec<Line>, Vec<(String, BezPat
     let top_mm = 0.5 * (n_rows as f64 - 1.0) * pitch_mm;
     let at = |row: usize| top_mm - pitch_mm * row as f64;
     let (mut lines, mut labels) = (Vec::new(), Vec::new());
-    for row in 0..n_rows {
-        let speed = row / (2 * options.n_lines as usize);
+    let blocks = blocks(n_speeds, options.n_lines as usize);
+    let speeds = blocks.iter().flat_map(|&(speed, n)| std::iter::repeat_n(speed, 2 * n));
+    for (row, speed) in speeds.enumerate() {
         let (left, right) = (Point::new(-half_mm, at(row)), Point::new(half_mm, at(row)));
         let (from, to) = if row % 2 == 0 { (left, right) } else { (right, left) };
         lines.push(Line { id: format!("line-{}", row + 1), from, to, speed: Some(speed) });
@@ -168,21 +171,34 @@ fn comb(options: &DelayOptions, spot_mm: f64) -> (Vec<Line>, Vec<(String, BezPat
     let below_mm = -top_mm - 3.5 * pitch_mm;
     let (left, right) = (Point::new(-0.9 * half_mm, below_mm), Point::new(0.9 * half_mm, below_mm));
     lines.push(reference("reference-below", left, right));
-    for (index, speed) in options.speeds_mm_s.iter().enumerate() {
-        let text = format!("{}", speed * 1e-3);
-        let middle = at((2 * index + 1) * options.n_lines as usize) + 0.5 * pitch_mm;
+    let mut row = 0;
+    for (speed, n) in blocks {
+        let text = format!("{}", options.speeds_mm_s[speed] * 1e-3);
+        let middle = at(row + n) + 0.5 * pitch_mm;
+        row += 2 * n;
         let label = Affine::scale(LETTER_MM) * sheet::lettering(&text);
         let size = label.bounding_box();
         let place = Vec2::new(
             -side_mm - 2.0 * REFERENCE_GAP_MM - size.width(),
             middle - 0.5 * size.height(),
         );
-        labels.push((format!("label {text} m/s"), Affine::translate(place) * label));
+        labels.push((format!("label {row}: {text} m/s"), Affine::translate(place) * label));
     }
     let sign_mm = 2.5 * LETTER_MM;
     let corner = Point::new(side_mm + REFERENCE_GAP_MM, -over_mm);
     labels.extend(sheet::axes_sign(Rect::from_origin_size(corner, (sign_mm, sign_mm))));
     (lines, labels)
+}
+
+/// Speeds in the order of their rows, each with its lines each way.
+///
+/// They take turns, so that material which is harder to mark on one side is not taken for an effect
+/// of the speed.
+fn blocks(n_speeds: usize, n_lines: usize) -> Vec<(usize, usize)> {
+    let turns = (0..n_lines).step_by(N_BLOCK);
+    turns
+        .flat_map(|done| (0..n_speeds).map(move |speed| (speed, N_BLOCK.min(n_lines - done))))
+        .collect()
 }
 
 /// The open rectangle: a fast line above to the right, one below to the left, slow sides.
