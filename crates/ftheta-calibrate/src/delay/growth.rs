@@ -200,7 +200,7 @@ mod tests {
     fn widths_of_constant_power_give_the_spot() {
         let speeds: Vec<SpeedWidth> = [1.0, 2.0, 4.0, 6.0, 8.0, 10.0]
             .map(|v| {
-                let width_mm = std::f64::consts::SQRT_2 * 0.05 * (15.0 / v as f64).ln().sqrt();
+                let width_mm = std::f64::consts::SQRT_2 * 0.05 * (15.0_f64 / v).ln().sqrt();
                 SpeedWidth { speed_mm_s: v * 1e3, power_ratio: 1.0, width_mm }
             })
             .into();

@@ -9,7 +9,9 @@ use super::error::DelayError;
 use super::growth::{Growth, SpeedWidth, USUAL_WIDTH, seen_growth};
 use super::layout::Layout;
 use super::measured::Reject;
-use super::{Delays, LineEndSeen, Method, Observed, SceneFacts};
+use super::regression::LineEnd;
+use super::{Delays, Line, LineEndSeen, Method, Observed, SceneFacts};
+use ftheta_model::picture::Picture;
 
 /// What the growth is uncertain by, as a part of the width: with a spot from a data sheet, without,
 /// and where the width cannot be seen for blur.
@@ -22,7 +24,7 @@ const LOG_DOSE_MAX: f64 = 7.0;
 
 /// Delays of a rectangle.
 pub fn rectangle(
-    picture: &ftheta_model::picture::Picture,
+    picture: &Picture,
     layout: &Layout,
     speeds: &[f64],
     spot_radius_mm: Option<f64>,
@@ -30,6 +32,51 @@ pub fn rectangle(
     if layout.columns_mm.len() < 2 {
         return Err(DelayError::NoSides { n_sides: layout.columns_mm.len() });
     }
+    let (observed, ends) = free_ends(picture, layout, speeds)?;
+    let widths = observed.widths_by_speed(layout, speeds);
+    let Growing { spot_mm, width_mm, growth_mm, sd_mm: growth_sd_mm } =
+        growing(&observed, &widths, spot_radius_mm);
+    // How late each end is, and what the patent would say.
+    let late = |on: bool, extra_mm: f64| {
+        let outward = if on { -1.0 } else { 1.0 };
+        let times = ends.iter().filter(|end| end.on == on);
+        times
+            .map(|end| (end.sense * end.off_mm - outward * extra_mm) / end.speed_mm_s)
+            .collect::<Vec<f64>>()
+    };
+    let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
+    let [on, off] = [true, false].map(|on| late(on, growth_mm));
+    // The patent's gap reaches to the outer edge, so half a width more, and nothing for the growth.
+    let patent_s = [true, false].map(|on| mean(&late(on, 0.5 * width_mm)));
+    let speed = mean(speeds);
+    let edge_sd_s = observed.facts.mm_per_px * 0.1 / speed / (0.5 * on.len().max(1) as f64).sqrt();
+    let sd_s = (growth_sd_mm / speed).hypot(edge_sd_s);
+    Ok(Delays {
+        method: Method::Rectangle,
+        tau_on_s: mean(&on),
+        tau_off_s: mean(&off),
+        sd_s: [sd_s, sd_s, edge_sd_s],
+        acceleration_mm_s2: None,
+        growth: Growth::Modelled {
+            spot_radius_mm: spot_mm,
+            clear: spot_radius_mm.is_some(),
+            growth_mm: vec![growth_mm],
+        },
+        growth_mm: 0.0,
+        rms_mm: 0.0,
+        patent_s: Some(patent_s),
+        lines: lines(&observed, layout, &ends),
+        widths,
+        scene: observed.facts,
+    })
+}
+
+/// The pattern as it was found, and the ends of its lines: all of them, free of the sides.
+fn free_ends(
+    picture: &Picture,
+    layout: &Layout,
+    speeds: &[f64],
+) -> Result<(Observed, Vec<LineEnd>), DelayError> {
     let n_ends = 2 * layout.rows.iter().filter(|row| row.process.is_some()).count();
     let observed = Observed::new(picture, layout).map_err(|error| match error {
         // Lines that touch a side are no strokes of their own.
@@ -49,24 +96,10 @@ pub fn rectangle(
             None => DelayError::NoGap { n_free, n_ends },
         });
     }
-    let widths = observed.widths_by_speed(layout, speeds);
-    let Growing { spot_mm, width_mm, growth_mm, sd_mm: growth_sd_mm } =
-        growing(&observed, &widths, spot_radius_mm);
-    // How late each end is, and what the patent would say.
-    let late = |on: bool, extra_mm: f64| {
-        let outward = if on { -1.0 } else { 1.0 };
-        let times = ends.iter().filter(|end| end.on == on);
-        times
-            .map(|end| (end.sense * end.off_mm - outward * extra_mm) / end.speed_mm_s)
-            .collect::<Vec<f64>>()
-    };
-    let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
-    let [on, off] = [true, false].map(|on| late(on, growth_mm));
-    // The patent's gap reaches to the outer edge, so half a width more, and nothing for the growth.
-    let patent_s = [true, false].map(|on| mean(&late(on, 0.5 * width_mm)));
-    let speed = mean(speeds);
-    let edge_sd_s = observed.facts.mm_per_px * 0.1 / speed / (0.5 * on.len().max(1) as f64).sqrt();
-    let sd_s = (growth_sd_mm / speed).hypot(edge_sd_s);
+    Ok((observed, ends))
+}
+
+fn lines(observed: &Observed, layout: &Layout, ends: &[LineEnd]) -> Vec<Line> {
     let lines = observed.lines.iter().enumerate().map(|(index, line)| {
         let row = &layout.rows[line.row];
         let of = |on: bool| {
@@ -78,31 +111,14 @@ pub fn rectangle(
                 reject: None,
             }
         };
-        super::Line {
+        Line {
             id: row.id.clone(),
-            speed_mm_s: speed,
+            speed_mm_s: row.process.map_or(0.0, |process| process.speed_mm_s),
             forth: row.sense() > 0.0,
             ends: [of(true), of(false)],
         }
     });
-    Ok(Delays {
-        method: Method::Rectangle,
-        tau_on_s: mean(&on),
-        tau_off_s: mean(&off),
-        sd_s: [sd_s, sd_s, edge_sd_s],
-        acceleration_mm_s2: None,
-        growth: Growth::Modelled {
-            spot_radius_mm: spot_mm,
-            clear: spot_radius_mm.is_some(),
-            growth_mm: vec![growth_mm],
-        },
-        growth_mm: 0.0,
-        rms_mm: 0.0,
-        patent_s: Some(patent_s),
-        lines: lines.collect(),
-        widths,
-        scene: observed.facts,
-    })
+    lines.collect()
 }
 
 /// How far ends grow, and how well that is known.

@@ -95,40 +95,29 @@ pub fn fit_view(
         }
     }
     let found = fitted?;
-    finish(&lens, &found.parameters, found.covariance.as_ref(), &samples, layout, columns, scale)
-}
-
-#[allow(clippy::too_many_arguments, reason = "the end of one fit, apart for its length")]
-fn finish(
-    lens: &CameraLens,
-    parameters: &[f64],
-    covariance: Option<&nalgebra::DMatrix<f64>>,
-    samples: &[Sample],
-    layout: &Layout,
-    columns: bool,
-    scale: f64,
-) -> Option<FittedView> {
-    let seen_now = seen(lens, parameters);
-    let sum: f64 = samples.iter().map(|s| left_px(&seen_now, s, scale).powi(2)).sum();
+    let seen = seen(&lens, &parameters);
+    let sum: f64 = samples.iter().map(|s| left_px(&seen, s, scale).powi(2)).sum();
     let rms_px = (sum / samples.len() as f64).sqrt();
-    let (lens, plane_from_ray) = unpacked(lens, parameters);
-    let mut homography = plane_from_ray.try_inverse()?;
-    let rows = &layout.rows;
-    let middle = rows.iter().map(|row| row.across_mm).sum::<f64>() / rows.len() as f64;
-    if (homography * Vector3::new(0.0, middle, 1.0)).z < 0.0 {
-        homography = -homography;
-    }
-    let view = View { lens, homography };
-    let middle = FieldPoint::new(0.0, middle);
-    let beside = FieldPoint::new(1.0, middle.y_mm);
-    let px_per_mm = view.pixel(middle)?.distance(view.pixel(beside)?);
     // Of the entries of the map, the first two are the scale along.
     let size = parameters[0].hypot(parameters[1]);
-    let scale_sd = covariance.map_or(f64::INFINITY, |covariance| {
+    let scale_sd = found.covariance.map_or(f64::INFINITY, |covariance| {
         rms_px * (covariance[(0, 0)] + covariance[(1, 1)]).max(0.0).sqrt() / size
     });
+    let rows = &layout.rows;
+    let middle = rows.iter().map(|row| row.across_mm).sum::<f64>() / rows.len() as f64;
+    let view = view(&lens, &parameters, middle)?;
+    let (middle, beside) = (FieldPoint::new(0.0, middle), FieldPoint::new(1.0, middle));
+    let px_per_mm = view.pixel(middle)?.distance(view.pixel(beside)?);
     let seen = view.inverse()?;
     Some(FittedView { view, seen, rms_px, mm_per_px: 1.0 / px_per_mm, columns, scale_sd })
+}
+
+/// The view of the parameters, with what lies at this place across before the camera.
+fn view(lens: &CameraLens, parameters: &[f64], across_mm: f64) -> Option<View> {
+    let (lens, plane_from_ray) = unpacked(lens, parameters);
+    let homography = plane_from_ray.try_inverse()?;
+    let before = (homography * Vector3::new(0.0, across_mm, 1.0)).z > 0.0;
+    Some(View { lens, homography: if before { homography } else { -homography } })
 }
 
 /// The map from rays to the plane of a picture taken square on: six entries, row by row.

@@ -1,6 +1,6 @@
 //! Arguments of `ftheta pattern`.
 
-use super::{mismatch, positive, rate};
+use super::{mismatch, pair, positive, rate};
 use clap::{Args, Subcommand, ValueEnum};
 use ftheta::model::pattern::MarkStyle;
 use ftheta::pattern::grid::N_SIDE_MAX;
@@ -150,14 +150,8 @@ pub struct DelayPattern {
     pub room_us: f64,
     /// Light goes on and off so much later on purpose, µs, so that a rectangle's gaps show; 0 if
     /// not given, 200,-200 for a rectangle.
-    #[arg(
-        long,
-        value_name = "ON,OFF",
-        value_delimiter = ',',
-        num_args = 2,
-        allow_hyphen_values = true
-    )]
-    pub preset_us: Vec<f64>,
+    #[arg(long, value_name = "ON,OFF", allow_hyphen_values = true, value_parser = pair)]
+    pub preset_us: Option<[f64; 2]>,
     /// Setting of the laser-on delay meanwhile, µs, positive is later; as the machine file has it.
     #[arg(long, value_name = "T", requires = "off_us")]
     pub on_us: Option<f64>,

@@ -7,17 +7,21 @@ use ftheta::calibrate::delay::Method;
 use ftheta::calibrate::delay::growth::Growth;
 use ftheta::delay_calibration::{DelayCalibration, calibrate_delay};
 use ftheta::formats::machine::to_toml;
-use ftheta::model::pattern::LaserDelays;
+use ftheta::model::machine::Machine;
+use ftheta::model::pattern::{LaserDelays, Pattern};
+use ftheta::model::warning::Warning;
 use ftheta::output::write_file;
 use ftheta::{Error, camera, import, machines};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
+/// The machine where none is known.
+const GUESSED: &str = "S10";
+
 /// Measures delays, and writes them into a machine file if asked to.
 pub fn run(arguments: &CalibrateDelay, as_json: bool) -> Result<(), Error> {
     let pattern = import::pattern(&arguments.pattern)?;
-    let name = arguments.machine.as_deref().or(pattern.machine.as_deref()).unwrap_or("S10");
-    let machine = machines::find(name)?;
+    let (machine, guessed) = machine(arguments, &pattern)?;
     let (source, picture) = match (&arguments.camera, &arguments.image) {
         (Some(device), _) => (PathBuf::from(device), camera::take(device)?),
         (None, image) => {
@@ -26,8 +30,12 @@ pub fn run(arguments: &CalibrateDelay, as_json: bool) -> Result<(), Error> {
             (path, picture)
         }
     };
-    let found = calibrate_delay(&picture, &pattern, &machine, arguments.method.map(Into::into))
+    let mut found = calibrate_delay(&picture, &pattern, &machine, arguments.method.map(Into::into))
         .map_err(|error| Error::Delay { path: source.clone(), source: error })?;
+    if guessed {
+        let text = format!("the pattern names no machine that is known here: {GUESSED} is taken");
+        found.warnings.push(Warning::new("machine", text));
+    }
     let (applied, left) = found.applied(&machine, arguments.apply.into());
     let beside = arguments.out.as_deref().or(arguments.image.as_deref());
     let report = beside.unwrap_or(Path::new("")).with_file_name("calibration.html");
@@ -44,6 +52,18 @@ pub fn run(arguments: &CalibrateDelay, as_json: bool) -> Result<(), Error> {
         false => print(&found, left, &files),
     }
     Ok(())
+}
+
+/// The machine that the pattern was marked with, and whether it had to be guessed; a user's own is
+/// known by its file alone.
+fn machine(arguments: &CalibrateDelay, pattern: &Pattern) -> Result<(Machine, bool), Error> {
+    let named = arguments.machine.as_deref().or(pattern.machine.as_deref());
+    match (named.map(machines::find), &arguments.machine, &arguments.out) {
+        (Some(Ok(machine)), ..) => Ok((machine, false)),
+        // A comb can be measured without, as long as nothing is written.
+        (None, ..) | (Some(Err(_)), None, None) => Ok((machines::find(GUESSED)?, true)),
+        (Some(Err(error)), ..) => Err(error),
+    }
 }
 
 fn object(

@@ -56,30 +56,27 @@ fn run_square(arguments: &SquarePattern, as_json: bool) -> Result<(), Error> {
 
 fn run_delay(arguments: &DelayPattern, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(&arguments.machine)?;
-    let comb = arguments.method == DelayMethod::Comb;
-    let or = |given: &[f64], usual: &[f64]| match given {
-        [] => usual.to_vec(),
-        given => given.to_vec(),
+    let method = match arguments.method {
+        DelayMethod::Comb => Method::Comb,
+        DelayMethod::Rectangle => Method::Rectangle,
     };
-    let usual: &[f64] = if comb { &[1e3, 2e3, 4e3, 6e3, 8e3, 1e4] } else { &[5e3] };
-    let preset_us = or(&arguments.preset_us, if comb { &[0.0, 0.0] } else { &[200.0, -200.0] });
-    let options = DelayOptions {
-        method: if comb { Method::Comb } else { Method::Rectangle },
-        axis: match arguments.axis {
-            AxisName::X => LineAxis::X,
-            AxisName::Y => LineAxis::Y,
-        },
-        speeds_mm_s: or(&arguments.speeds, usual),
-        n_lines: arguments.lines.unwrap_or(if comb { 10 } else { 1 }),
-        length_mm: arguments.length_mm.unwrap_or(if comb { 4.0 } else { 10.0 }),
-        room_s: arguments.room_us * 1e-6,
-        preset_s: [preset_us[0] * 1e-6, preset_us[1] * 1e-6],
-        laser: arguments
-            .on_us
-            .zip(arguments.off_us)
-            .map(|(on_us, off_us)| LaserDelays { on_us, off_us }),
-        power_w: process(&machine, None, arguments.power_w).power_w,
+    let mut options = DelayOptions::usual(method, &machine);
+    options.axis = match arguments.axis {
+        AxisName::X => LineAxis::X,
+        AxisName::Y => LineAxis::Y,
     };
+    if !arguments.speeds.is_empty() {
+        options.speeds_mm_s.clone_from(&arguments.speeds);
+    }
+    options.n_lines = arguments.lines.unwrap_or(options.n_lines);
+    options.length_mm = arguments.length_mm.unwrap_or(options.length_mm);
+    options.room_s = arguments.room_us * 1e-6;
+    if let Some(preset_us) = arguments.preset_us {
+        options.preset_s = preset_us.map(|us| us * 1e-6);
+    }
+    let set = arguments.on_us.zip(arguments.off_us);
+    options.laser = set.map(|(on_us, off_us)| LaserDelays { on_us, off_us });
+    options.power_w = arguments.power_w.unwrap_or(options.power_w);
     write_sheet(&delay::sheet(&options, &machine)?, &arguments.out, as_json)
 }
 

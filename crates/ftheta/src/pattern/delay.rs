@@ -7,7 +7,7 @@
 //! speed, so that all lines have the same dose and their ends grow alike.
 
 use super::error::PatternError;
-use super::sheet::{self, Sheet};
+use super::sheet::{self, Sheet, SheetProcess};
 use ftheta_model::job::{Job, Layer, Paint, Shape};
 use ftheta_model::machine::Machine;
 use ftheta_model::pattern::{Feature, FeatureShape, LaserDelays, LineProcess, Pattern};
@@ -31,6 +31,8 @@ const LETTER_MM: f64 = 1.2;
 const SPEEDS_MM_S: [f64; 2] = [1.0, 100_000.0];
 const N_LINES: [u32; 2] = [1, 100];
 const LENGTH_MM: [f64; 2] = [0.5, 100.0];
+/// What presets may leave of a line, by its length.
+const PRESET_LEAVES: [f64; 2] = [0.25, 3.0];
 /// Colours of the pens of each speed, in turn.
 const COLORS: [&str; 7] =
     ["#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#17becf"];
@@ -75,6 +77,26 @@ pub struct DelayOptions {
     pub laser: Option<LaserDelays>,
     /// Power at the fastest speed, W.
     pub power_w: f64,
+}
+
+impl DelayOptions {
+    /// A comb of 10 lines each way, 4 mm long, at six speeds up to 10 m/s, or a rectangle of 10 mm
+    /// at 5 m/s with gaps of 1 mm; along x, with the machine file's delays and 10 W, or what the
+    /// laser has.
+    pub fn usual(method: Method, machine: &Machine) -> Self {
+        let comb = method == Method::Comb;
+        Self {
+            method,
+            axis: LineAxis::X,
+            speeds_mm_s: if comb { vec![1e3, 2e3, 4e3, 6e3, 8e3, 1e4] } else { vec![5e3] },
+            n_lines: if comb { 10 } else { 1 },
+            length_mm: if comb { 4.0 } else { 10.0 },
+            room_s: 250e-6,
+            preset_s: if comb { [0.0; 2] } else { [200e-6, -200e-6] },
+            laser: None,
+            power_w: SheetProcess::of(machine).power_w,
+        }
+    }
 }
 
 /// A line to be marked.
@@ -137,7 +159,13 @@ fn check(options: &DelayOptions) -> Result<(), PatternError> {
         Method::Rectangle => refuse("--speeds", n_speeds, "of them", [1.0, 1.0])?,
     }
     refuse("--lines", f64::from(options.n_lines), "", N_LINES.map(f64::from))?;
-    refuse("--length-mm", options.length_mm, "mm", LENGTH_MM)
+    refuse("--length-mm", options.length_mm, "mm", LENGTH_MM)?;
+    // What presets leave of the fastest line: they must not turn it round, nor make it endless.
+    let fastest = options.speeds_mm_s.iter().copied().fold(0.0, f64::max);
+    let [on_s, off_s] = options.preset_s;
+    let left_mm = options.length_mm + (off_s - on_s) * fastest;
+    let limits = PRESET_LEAVES.map(|part| part * options.length_mm);
+    refuse("--preset-us, length left", left_mm, "mm", limits)
 }
 
 /// Lines and labels of a comb whose rows run along x.

@@ -83,17 +83,10 @@ impl Setup {
 
     /// The pattern.
     pub fn pattern(&self, machine: &Machine) -> Pattern {
-        let comb = self.method == Method::Comb;
         let options = DelayOptions {
-            method: self.method,
             axis: self.axis,
             speeds_mm_s: self.speeds_mm_s.to_vec(),
-            n_lines: if comb { 10 } else { 1 },
-            length_mm: if comb { 4.0 } else { 10.0 },
-            room_s: 250e-6,
-            preset_s: if comb { [0.0; 2] } else { [200e-6, -200e-6] },
-            laser: None,
-            power_w: 10.0,
+            ..DelayOptions::usual(self.method, machine)
         };
         sheet(&options, machine).unwrap().pattern
     }
