@@ -36,8 +36,10 @@ const BLUR: f64 = 0.2;
 const BENT_PX: f64 = 1.0;
 /// Share of the ends that may lie on cut-off white, percent.
 const SATURATED_PERCENT: f64 = 10.0;
-/// Greatest deviation of a delay, µs: beyond it no number is given; and beyond which it is said.
+/// Greatest deviation of a delay, µs: beyond it no number is given.
 const UNCERTAIN_US: f64 = 5.0;
+/// Greatest deviation of ends from the regression, in widths of a line and one pixel.
+const SCATTER_WIDTHS: f64 = 0.5;
 /// Lines of the same speed: to this part.
 const SAME_SPEED: f64 = 1e-3;
 
@@ -170,6 +172,11 @@ fn comb(picture: &Picture, layout: &Layout, speeds: &[f64]) -> Result<Delays, De
         .ok_or(DelayError::Uncertain { sd_us: f64::INFINITY, limit_us: UNCERTAIN_US })?;
     let lines = lines(layout, &observed.lines, &ends, &regression);
     judge(&lines, &regression)?;
+    let limit_mm = observed.facts.mm_per_px * (1.0 + SCATTER_WIDTHS * observed.width_px);
+    if regression.rms_mm > limit_mm {
+        let [rms_um, limit_um] = [regression.rms_mm, limit_mm].map(|mm| mm * 1e3);
+        return Err(DelayError::Scattered { rms_um, limit_um });
+    }
     // The scale's error is one of all lines together.
     let scaled = |sd: f64, tau: f64| sd.hypot(observed.facts.scale_sd * tau);
     let [on_sd, off_sd, mean_sd] = regression.sd_s;

@@ -9,7 +9,7 @@ use ftheta::calibrate::delay::Method;
 use ftheta::calibrate::delay::error::DelayError;
 use ftheta::delay_calibration::{Apply, calibrate_delay};
 use ftheta::formats::picture_file::PictureRead;
-use ftheta::model::pattern::Pattern;
+use ftheta::model::pattern::{FeatureShape, Pattern};
 use ftheta::model::picture::Picture;
 use ftheta::pattern::delay::LineAxis;
 use ftheta::photograph::PowerRule;
@@ -37,6 +37,17 @@ fn a_comb_tells_both_delays() {
     within("bright, upside down, along y", &turned, 16, [0.3, 0.1]);
     within("negative", &Setup { late_us: [-70.0, -95.0], ..comb }, 17, [0.3, 0.1]);
     within("next to nothing", &Setup { late_us: [0.7, -0.4], ..comb }, 18, [0.3, 0.1]);
+}
+
+/// The picture and the delays of the project's reference numbers; nobody of us drew it.
+#[test]
+fn the_reference_comb_is_85_and_60() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let read = ftheta::import::picture(&folder.join("ref_comb.png")).unwrap();
+    let pattern = ftheta::import::pattern(&folder.join("ref_comb.json")).unwrap();
+    let found = calibrate_delay(&read, &pattern, &Setup::comb().machine(), None).unwrap();
+    let [on_us, off_us] = [found.delays.tau_on_s * 1e6, found.delays.tau_off_s * 1e6];
+    assert!((on_us - 85.0).abs() < 0.3 && (off_us - 60.0).abs() < 0.3, "{on_us} {off_us}");
 }
 
 /// What is off in proportion to the speed hides in the patent's formula, and not in ours.
@@ -152,6 +163,15 @@ fn pictures_that_show_no_comb_give_no_number() {
     let few = Setup { speeds_mm_s: &[2e3, 9e3], ..setup }.pattern(&machine);
     let error = refused(&good, &few);
     assert!(matches!(error, DelayError::TooManyLines { .. }), "{error}");
+    let mut shuffled = pattern.clone();
+    for (index, feature) in shuffled.features.iter_mut().enumerate() {
+        if let FeatureShape::Line { process, .. } = &mut feature.shape {
+            process.speed_mm_s = comb::SPEEDS[index * 5 % 6];
+        }
+    }
+    let error = refused(&good, &shuffled);
+    let expected = matches!(error, DelayError::Scattered { .. } | DelayError::NotThePattern { .. });
+    assert!(expected, "{error}");
     let empty = Pattern { kind: "grid".into(), ..Pattern::default() };
     assert!(matches!(refused(&good, &empty), DelayError::NoLines { .. }));
 

@@ -137,13 +137,14 @@ fn files_go_together() {
         std::fs::read_to_string(path).unwrap()
     };
     expect![[r##"
-        # How the pattern is marked. Dots are filled with lines this far apart.
+        # How the pattern is marked.
+
         [[pen]]
         name = "pattern"
         color = "#000000"
         mark_speed_mm_s = 1000
         power_w = 10
-        hatch_spacing_mm = 0.0560
+        hatch_spacing_mm = 0.0560 # dots are filled with lines this far apart
         target_x_mm,target_y_mm,measured_x_mm,measured_y_mm,round,mark
         -140,-140,,,1,A1
         0,-140,,,1,B1

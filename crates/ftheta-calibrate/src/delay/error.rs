@@ -175,6 +175,17 @@ pub enum DelayError {
         /// Greatest, µs.
         limit_us: f64,
     },
+    /// Ends that no delays explain.
+    #[error(
+        "line ends lie {rms_um:.0} µm off where any delays would put them, the limit is \
+         {limit_um:.0} µm: is it the right .json, and were the lines marked at its speeds?"
+    )]
+    Scattered {
+        /// What is left, µm rms.
+        rms_um: f64,
+        /// Greatest, µm.
+        limit_um: f64,
+    },
     /// Gaps that do not show.
     #[error(
         "{n_free} of {n_ends} line ends stand free of the rectangle's sides, all have to: mark \
@@ -240,6 +251,9 @@ impl DelayError {
             }
             Self::Uncertain { sd_us, limit_us } => {
                 ("deviation, µs", format!("{sd_us:.1}"), format!("{limit_us:.1}"))
+            }
+            Self::Scattered { rms_um, limit_um } => {
+                ("line ends, µm", format!("{rms_um:.0}"), format!("{limit_um:.0}"))
             }
             Self::NoGap { n_free, n_ends } => ("free ends", n_free.to_string(), n_ends.to_string()),
             Self::NoSides { n_sides } => ("pattern sides", n_sides.to_string(), "2".into()),

@@ -35,6 +35,8 @@ const COLUMN_LENGTH: f64 = 0.6;
 const REFERENCE: f64 = 0.05;
 /// The best way leaves no more than this, px.
 const LEFT_PX: f64 = 12.0;
+/// Ways that leave no more than this agree with the picture, px.
+const AGREES_PX: f64 = 4.0;
 /// The right way to lay the pattern on the picture is better than any other by this factor.
 const CLEARLY: f64 = 2.0;
 /// Ways that leave up to so many times the least are about as good.
@@ -159,6 +161,9 @@ fn place_along(
     }
     if let Some(second) = hypotheses.get(1) {
         let (least, other) = (best.left_px.max(COARSE_PX), second.left_px.max(COARSE_PX));
+        if other < CLEARLY * least && best.left_px > AGREES_PX {
+            return Err(DelayError::NotThePattern { n_lines });
+        }
         if other < CLEARLY * least {
             return Err(DelayError::Orientation {
                 first_px: best.left_px,
