@@ -5,9 +5,11 @@
 
 mod coarse;
 pub mod error;
+mod frame;
 pub mod growth;
 mod layout;
 pub mod measured;
+mod pairing;
 mod placement;
 mod profile;
 mod rectangle;
@@ -113,6 +115,8 @@ pub struct SceneFacts {
     pub references: bool,
     /// Whether the picture shows the pattern upside down.
     pub upside_down: bool,
+    /// Whether it might as well be upside down: the pattern has nothing that tells.
+    pub upright_assumed: bool,
 }
 
 /// A line of the pattern and what was seen of it.
@@ -239,6 +243,7 @@ impl Observed {
             view_rms_px: view.rms_px,
             references: view.columns,
             upside_down: placement.upside_down,
+            upright_assumed: placement.upright_assumed,
         };
         Ok(Self { lines, width_px, facts })
     }

@@ -111,8 +111,12 @@ fn warnings(delays: &Delays, pattern: &Pattern) -> Vec<Warning> {
         warnings.push(Warning::new("pattern", text));
     }
     if !scene.references {
-        let text = "no burned reference lines were found: scale comes from the distance of the \
+        let text = "the pattern has no burned reference lines: scale comes from the distance of the \
                     rows, and that the picture is not mirrored is taken for granted";
+        warnings.push(Warning::new("picture", text));
+    }
+    if scene.upright_assumed {
+        let text = "nothing in it tells which way is up; it is taken for upright";
         warnings.push(Warning::new("picture", text));
     }
     if scene.upside_down {

@@ -108,6 +108,17 @@ pub enum DelayError {
         /// What the next one leaves, px.
         second_px: f64,
     },
+    /// References that are not in the picture, or others beside them.
+    #[error(
+        "{n_found} lines across the rows are in the picture, the pattern has {n_columns} reference \
+         lines there: take the whole pattern with nothing else, and keep dirt and glare off them"
+    )]
+    References {
+        /// Lines across the rows.
+        n_found: usize,
+        /// Those of the pattern.
+        n_columns: usize,
+    },
     /// Mirrored.
     #[error(
         "the picture is mirrored: its reference lines are on the wrong side; mirror it back, or \
@@ -236,6 +247,9 @@ impl DelayError {
                 format!("{second_px:.1}"),
                 format!("{:.1}", 2.0 * first_px.max(1.0)),
             ),
+            Self::References { n_found, n_columns } => {
+                ("reference lines", n_found.to_string(), n_columns.to_string())
+            }
             Self::Mirrored => ("picture", "mirrored".into(), "not mirrored".into()),
             Self::Blurred { blur_px, limit_px, .. } => {
                 ("blur, px", format!("{blur_px:.1}"), format!("{limit_px:.1}"))

@@ -1,8 +1,8 @@
 //! The camera's view of a delay pattern, fitted to the lines that the delays do not move.
 //!
 //! Wherever a line begins and ends, its row stays where it is, and so do the references across the
-//! rows. Both together fix perspective, scale and the lens; rows alone fix scale and rotation of a
-//! picture that was taken square on.
+//! rows. Both together fix perspective, scale and the lens; rows alone all but how much wider than
+//! high the picture is.
 
 use super::layout::Layout;
 use super::placement::Placement;
@@ -72,7 +72,10 @@ pub fn fit_view(
             .chain([0.0, 0.0, 0.0])
             .zip([1e-4; 6].into_iter().chain([1e-6, 1e-6, 1e-4]))
             .unzip(),
-        false => ([first[0], first[1], first[5]].into_iter()).zip([1e-4; 3]).unzip(),
+        // Nothing fixes the scale along: it is that across, and where the rows lie is left open.
+        false => ([first[3], first[4], first[5], 0.0, 0.0, 0.0].into_iter())
+            .zip([1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-4])
+            .unzip(),
     };
     let mut parameters = first;
     let mut fitted = None;
@@ -81,7 +84,7 @@ pub fn fit_view(
             out.clear();
             let seen = seen(&lens, p);
             out.extend(samples.iter().map(|s| left_px(&seen, s, scale)));
-            out.push(p.get(8).map_or(0.0, |k1| k1 / BENDING));
+            out.push(p[p.len() - 1] / BENDING);
         })?;
         parameters.clone_from(&found.parameters);
         let seen = seen(&lens, &parameters);
@@ -148,14 +151,12 @@ fn first_guess(layout: &Layout, placement: &Placement, lens: &CameraLens) -> [f6
     [scale * cos, scale * sin, along, scale * sin, -scale * cos, across]
 }
 
-/// Lens and map of the parameters: nine of them, or three of a similarity.
+/// Lens and map of the parameters: nine of them, or six where only rows are known.
 fn unpacked(lens: &CameraLens, p: &[f64]) -> (CameraLens, Matrix3<f64>) {
+    let bent = |k1: f64| CameraLens { radial: [k1, 0.0, 0.0], ..*lens };
     match *p {
-        [a, b, c, d, e, f, g, h, k1] => {
-            let lens = CameraLens { radial: [k1, 0.0, 0.0], ..*lens };
-            (lens, Matrix3::new(a, b, c, d, e, f, g, h, 1.0))
-        }
-        [a, b, c, ..] => (*lens, Matrix3::new(a, b, 0.0, b, -a, c, 0.0, 0.0, 1.0)),
+        [a, b, c, d, e, f, g, h, k1] => (bent(k1), Matrix3::new(a, b, c, d, e, f, g, h, 1.0)),
+        [d, e, f, g, h, k1] => (bent(k1), Matrix3::new(-e, d, 0.0, d, e, f, g, h, 1.0)),
         _ => (*lens, Matrix3::identity()),
     }
 }
