@@ -156,7 +156,11 @@ fn unpacked(lens: &CameraLens, p: &[f64]) -> (CameraLens, Matrix3<f64>) {
     let bent = |k1: f64| CameraLens { radial: [k1, 0.0, 0.0], ..*lens };
     match *p {
         [a, b, c, d, e, f, g, h, k1] => (bent(k1), Matrix3::new(a, b, c, d, e, f, g, h, 1.0)),
-        [d, e, f, g, h, k1] => (bent(k1), Matrix3::new(-e, d, 0.0, d, e, f, g, h, 1.0)),
+        // In the picture's middle a millimetre along is as long as one across.
+        [d, e, f, g, h, k1] => {
+            let (across_x, across_y) = (d - f * g, e - f * h);
+            (bent(k1), Matrix3::new(-across_y, across_x, 0.0, d, e, f, g, h, 1.0))
+        }
         _ => (*lens, Matrix3::identity()),
     }
 }
