@@ -11,6 +11,8 @@ pub mod error;
 mod levenberg;
 pub mod mark;
 mod physical;
+pub mod picture;
+mod raster;
 pub mod sanity;
 mod surface;
 pub mod table;

@@ -2,8 +2,9 @@
 
 use super::layout::Layout;
 use super::placement::Located;
-use super::profile::{Edge, Strip, centre_px, edge};
+use super::profile::{Edge, edge};
 use super::view::FittedView;
+use crate::raster::strip::{Strip, centre_px, straight};
 use ftheta_model::picture::{Picture, PixelPoint};
 
 /// Places along a line at which its middle is looked for.
@@ -225,27 +226,4 @@ impl Scene<'_> {
         }
         Ok(SeenEnd { pixel: here, along_mm, edge })
     }
-}
-
-/// The straight line through points, those far off left out: height at 0 and slope.
-fn straight(points: &[(f64, f64)]) -> (f64, f64) {
-    let mut used: Vec<(f64, f64)> = points.to_vec();
-    let mut line = (0.0, 0.0);
-    for _ in 0..3 {
-        let n = used.len() as f64;
-        let (mean_t, mean_n) =
-            (used.iter().map(|p| p.0).sum::<f64>() / n, used.iter().map(|p| p.1).sum::<f64>() / n);
-        let (tt, tn) = used.iter().fold((0.0, 0.0), |(tt, tn), p| {
-            let t = p.0 - mean_t;
-            (tt + t * t, tn + t * (p.1 - mean_n))
-        });
-        let slope = if tt > 0.0 { tn / tt } else { 0.0 };
-        line = (mean_n - slope * mean_t, slope);
-        let off = |p: &(f64, f64)| (p.1 - line.0 - line.1 * p.0).abs();
-        let mut sizes: Vec<f64> = points.iter().map(off).collect();
-        let middle = sizes.len() / 2;
-        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-        used = points.iter().filter(|p| off(p) < 4.0 * (1.5 * median).max(0.05)).copied().collect();
-    }
-    line
 }

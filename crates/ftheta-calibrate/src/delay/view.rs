@@ -6,8 +6,8 @@
 
 use super::layout::Layout;
 use super::placement::Placement;
-use super::profile::{Strip, centre_px};
 use crate::levenberg::minimise;
+use crate::raster::strip::{Strip, centre_px};
 use ftheta_model::picture::{Picture, PixelPoint};
 use ftheta_model::space::FieldPoint;
 use ftheta_physics::camera::{CameraLens, Seen, View};

@@ -1,0 +1,446 @@
+//! Where the marks of a grid are, from a picture of it.
+//!
+//! [`find_field`] is the entry. What tells lengths is a printed sheet with signs around the grid, a
+//! scanner's scale, or a camera whose view of the plane is known.
+
+mod candidates;
+mod centre;
+pub mod error;
+mod grid;
+mod guess;
+mod lattice;
+mod quad;
+pub mod signs;
+pub mod view_fit;
+
+use crate::raster::flat::Flat;
+use candidates::{Ground, Shape};
+use error::PictureError;
+use ftheta_model::pattern::{FeatureShape, Pattern};
+use ftheta_model::picture::{Picture, PixelPoint, Sighting};
+use ftheta_model::space::FieldPoint;
+use ftheta_model::tag;
+use ftheta_physics::camera::{CameraLens, Seen, View};
+use grid::Grid;
+use lattice::Lattice;
+use signs::{Sign, find_signs};
+use view_fit::fit_view;
+
+/// Fewest signs, and the share of the sheet's, that a view is fitted to.
+const N_SIGNS_MIN: usize = 4;
+const SIGNS_SHARE: f64 = 0.5;
+/// With a lens that is not known there have to be more.
+const N_SIGNS_FREE: usize = 8;
+/// Signs are no farther off the fitted view than this, px rms.
+const BENT_PX: f64 = 0.6;
+/// Printers are no farther off than this, percent.
+const PRINT_PERCENT: f64 = 3.0;
+/// Share of the marks that has to be found.
+const MARKS_SHARE: f64 = 0.7;
+/// Smallest mark, px.
+const SIZE_MIN_PX: f64 = 10.0;
+/// Marks beside the grid, by its own, that are another grid.
+const BESIDE_SHARE: f64 = 0.2;
+const N_BESIDE: usize = 8;
+/// Brightness that counts as cut off, and the share of marks that may lie on it, percent.
+const WHITE: f32 = 0.985;
+const SATURATED_PERCENT: f64 = 10.0;
+/// Lines are no wider than this part of a mark.
+const BLURRED: f64 = 0.3;
+/// Least contrast, of full scale and in deviations of the noise.
+const CONTRAST_MIN: f64 = 0.02;
+const CONTRAST_NOISE: f64 = 4.0;
+
+/// What is known beside picture and pattern.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PictureOptions {
+    /// What the sheet's printed lines along x and y measure, mm.
+    pub sheet_mm: [Option<f64>; 2],
+    /// The camera's lens; fitted to the signs if `None`.
+    pub lens: Option<CameraLens>,
+    /// The camera's view of the plane, where it stands still.
+    pub view: Option<View>,
+    /// Side of a pixel, mm, of a scanner.
+    pub mm_per_px: Option<f64>,
+    /// How the field's own place and turn are taken.
+    pub placement: Placement,
+}
+
+/// Where the field lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Placement {
+    /// Where its marks say: a sheet that was laid by hand says nothing of it.
+    #[default]
+    Marks,
+    /// Where the sheet says: it lies true on the machine's axes.
+    Sheet,
+}
+
+/// Marks of a pattern as a picture shows them.
+#[derive(Clone, Debug)]
+pub struct FieldSeen {
+    /// Every mark of the pattern, in its order.
+    pub marks: Vec<MarkSeen>,
+    /// The sheet's signs.
+    pub signs: Vec<SignSeen>,
+    /// What looks like a mark and is none of the grid.
+    pub extra: Vec<PixelPoint>,
+    /// Whether marks are brighter than the ground.
+    pub bright: bool,
+    /// Scale in the middle of the grid, mm/px.
+    pub mm_per_px: f64,
+    /// What the signs are off the fitted view, px rms; 0 without signs.
+    pub view_rms_px: f64,
+    /// The camera's view, if it was fitted or known.
+    pub view: Option<View>,
+    /// Whether signs or a known view tell which way the grid lies; if not it is as the picture was
+    /// taken.
+    pub oriented: bool,
+}
+
+/// A mark of the pattern.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MarkSeen {
+    /// Its name.
+    pub id: String,
+    /// Where it should be, mm.
+    pub target_mm: FieldPoint,
+    /// Where it is in the picture; `None` if it was not found.
+    pub pixel: Option<PixelPoint>,
+    /// Where that is in the field, mm.
+    pub measured_mm: Option<FieldPoint>,
+}
+
+/// A printed sign in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignSeen {
+    /// Its number.
+    pub number: usize,
+    /// Its corners.
+    pub corners: [PixelPoint; 4],
+    /// Whether the view was fitted to it.
+    pub kept: bool,
+}
+
+/// What tells lengths in a picture.
+enum Ruler {
+    /// A view of the plane, with signs if they gave it.
+    View { view: View, seen: Seen, rms_px: f64, signs: Vec<SignSeen> },
+    /// A scanner.
+    Scale(f64),
+}
+
+/// Finds the marks of a pattern's grid in a picture.
+///
+/// # Errors
+/// If the picture does not show the pattern, or not well enough, or nothing tells lengths.
+pub fn find_field(
+    picture: &Picture,
+    pattern: &Pattern,
+    options: &PictureOptions,
+) -> Result<FieldSeen, PictureError> {
+    let grid = Grid::new(pattern)?;
+    let flat = Flat::new(picture);
+    contrast(&flat)?;
+    let ruler = ruler(picture, &flat, pattern, options)?;
+    let found = match &ruler {
+        Ruler::View { view, seen, .. } => {
+            let shape = |pixel: PixelPoint| grid.shape(view, seen, pixel);
+            let ways = |pixel: PixelPoint| grid.ways(view, seen, pixel);
+            indexed(picture, &flat, &grid, &Looks { shape: &shape, ways: &ways })?
+        }
+        Ruler::Scale(_) => without_signs(picture, &flat, &grid)?,
+    };
+    let low = match &ruler {
+        Ruler::View { seen, .. } => grid.anchored(&found.lattice, &found.marks, Some(seen))?,
+        Ruler::Scale(_) => grid.anchored(&found.lattice, &found.marks, None)?,
+    };
+    let pixels = grid.pixels(&found.lattice, &found.marks, low);
+    judge(picture, &grid, &found, &pixels)?;
+    Ok(assembled(&grid, found, pixels, ruler, options.placement))
+}
+
+/// Centres of a pattern's marks in a picture of which nothing is known, for those who have their own
+/// ruler: as [`find_field`] finds them, without lengths.
+///
+/// # Errors
+/// If the picture does not show the pattern, or not well enough.
+pub fn find_marks(picture: &Picture, pattern: &Pattern) -> Result<Vec<MarkSeen>, PictureError> {
+    let options = PictureOptions { mm_per_px: Some(1.0), ..PictureOptions::default() };
+    Ok(find_field(picture, pattern, &options)?.marks)
+}
+
+fn contrast(flat: &Flat) -> Result<(), PictureError> {
+    let contrast = flat.extremes[1].max(-flat.extremes[0]);
+    let limit = CONTRAST_MIN.max(CONTRAST_NOISE * flat.noise_left);
+    match contrast < limit {
+        true => Err(PictureError::NoContrast { contrast, noise: flat.noise, limit }),
+        false => Ok(()),
+    }
+}
+
+fn ruler(
+    picture: &Picture,
+    flat: &Flat,
+    pattern: &Pattern,
+    options: &PictureOptions,
+) -> Result<Ruler, PictureError> {
+    if let Some(view) = options.view {
+        let seen = view.inverse().ok_or(PictureError::NoScale)?;
+        return Ok(Ruler::View { view, seen, rms_px: 0.0, signs: Vec::new() });
+    }
+    if let Some(mm_per_px) = options.mm_per_px {
+        return Ok(Ruler::Scale(mm_per_px));
+    }
+    let fiducials = fiducials(pattern);
+    if fiducials.is_empty() {
+        return Err(PictureError::NoScale);
+    }
+    let scale = sheet_scale(pattern, options.sheet_mm)?;
+    let found = find_signs(picture, flat);
+    let sightings = sign_sightings(&found, &fiducials, scale)?;
+    let size_px = [picture.width(), picture.height()];
+    let n_least = if options.lens.is_some() { N_SIGNS_MIN } else { N_SIGNS_FREE };
+    let limit = n_least.max((SIGNS_SHARE * fiducials.len() as f64) as usize);
+    let few =
+        |n_found: usize| Err(PictureError::FewSigns { n_found, n_signs: fiducials.len(), limit });
+    if sightings.len() < limit {
+        return few(sightings.len());
+    }
+    let Some(fitted) = fit_view(&sightings, size_px, options.lens) else {
+        return few(sightings.len());
+    };
+    let n_kept = fitted.kept.iter().filter(|kept| **kept).count();
+    if n_kept < limit || fitted.rms_px > BENT_PX {
+        return Err(PictureError::Bent { rms_px: fitted.rms_px, limit_px: BENT_PX });
+    }
+    let signs = found.iter().zip(&fitted.kept).map(|(sign, &kept)| SignSeen {
+        number: sign.number,
+        corners: sign.corners,
+        kept,
+    });
+    let signs = signs.collect();
+    Ok(Ruler::View { view: fitted.view, seen: fitted.seen, rms_px: fitted.rms_px, signs })
+}
+
+/// Printed signs of a pattern: number, centre and side, mm.
+pub fn fiducials(pattern: &Pattern) -> Vec<(usize, FieldPoint, f64)> {
+    let printed = pattern.features.iter().filter_map(|feature| match &feature.shape {
+        FeatureShape::Fiducial { family, code, place_mm, size_mm, burned: false }
+            if family == tag::FAMILY =>
+        {
+            Some((code.parse().ok()?, *place_mm, *size_mm))
+        }
+        _ => None,
+    });
+    printed.collect()
+}
+
+/// Corners of the signs as they lie on the printed sheet.
+///
+/// # Errors
+/// If a sign is not the sheet's, there twice, or mirrored.
+pub fn sign_sightings(
+    found: &[Sign],
+    fiducials: &[(usize, FieldPoint, f64)],
+    scale: [f64; 2],
+) -> Result<Vec<Vec<Sighting>>, PictureError> {
+    let n_mirrored = found.iter().filter(|sign| sign.mirrored).count();
+    if 2 * n_mirrored > found.len() {
+        return Err(PictureError::Mirrored);
+    }
+    let mut groups = Vec::with_capacity(found.len());
+    for (index, sign) in found.iter().enumerate() {
+        let number = sign.number;
+        if found[..index].iter().any(|other| other.number == number) {
+            return Err(PictureError::SignTwice { number });
+        }
+        let known = fiducials.iter().find(|(known, ..)| *known == number);
+        let (_, centre, side_mm) = known.ok_or(PictureError::StrangeSign { number })?;
+        let half = 0.5 * side_mm;
+        let corners = [(-half, half), (half, half), (half, -half), (-half, -half)];
+        let sighting = |((dx, dy), pixel): ((f64, f64), &PixelPoint)| Sighting {
+            place_mm: FieldPoint::new(scale[0] * (centre.x_mm + dx), scale[1] * (centre.y_mm + dy)),
+            pixel: *pixel,
+        };
+        groups.push(corners.into_iter().zip(&sign.corners).map(sighting).collect());
+    }
+    Ok(groups)
+}
+
+/// Printed over drawn length along x and y.
+///
+/// # Errors
+/// If a line that is there was not measured, or cannot have this length.
+pub fn sheet_scale(
+    pattern: &Pattern,
+    sheet_mm: [Option<f64>; 2],
+) -> Result<[f64; 2], PictureError> {
+    let mut scale = [1.0; 2];
+    for (index, axis) in ['x', 'y'].into_iter().enumerate() {
+        let Some(nominal_mm) = printed_line_mm(pattern, index) else { continue };
+        let measured_mm = sheet_mm[index].ok_or(PictureError::SheetSize { axis, nominal_mm })?;
+        scale[index] = measured_mm / nominal_mm;
+        let limit_percent = PRINT_PERCENT;
+        if (scale[index] - 1.0).abs() * 100.0 > limit_percent || !scale[index].is_finite() {
+            let wrong =
+                PictureError::WrongSheetSize { axis, nominal_mm, measured_mm, limit_percent };
+            return Err(wrong);
+        }
+    }
+    Ok(scale)
+}
+
+/// Length of the longest printed reference line along x (0) or y (1), mm.
+pub fn printed_line_mm(pattern: &Pattern, axis: usize) -> Option<f64> {
+    let lines = pattern.features.iter().filter_map(|feature| match &feature.shape {
+        FeatureShape::Reference { from_mm, to_mm, burned: false } => {
+            let (dx, dy) = (to_mm.x_mm - from_mm.x_mm, to_mm.y_mm - from_mm.y_mm);
+            (usize::from(dy.abs() > dx.abs()) == axis).then_some(dx.hypot(dy))
+        }
+        _ => None,
+    });
+    lines.reduce(f64::max)
+}
+
+/// How marks look, and how far they are from each other, at a place of the picture.
+struct Looks<'a> {
+    shape: &'a dyn Fn(PixelPoint) -> Option<Shape>,
+    ways: &'a dyn Fn(PixelPoint) -> Option<[[f64; 2]; 2]>,
+}
+
+/// Marks that were found, and which of them form the grid.
+struct Found {
+    bright: bool,
+    marks: Vec<PixelPoint>,
+    lattice: Lattice,
+}
+
+/// Finds marks and puts them in order.
+fn indexed(
+    picture: &Picture,
+    flat: &Flat,
+    grid: &Grid,
+    looks: &Looks<'_>,
+) -> Result<Found, PictureError> {
+    let ground = Ground { off: &flat.off, width: picture.width(), noise: flat.noise_left };
+    let (bright, list) = candidates::candidates(&ground, looks.shape, grid.n_marks());
+    // Twice as many as there can be is enough, and bounds the work on gravel.
+    let marks: Vec<PixelPoint> = list
+        .iter()
+        .take(4 * grid.n_marks() + 100)
+        .filter_map(|candidate| {
+            let shape = (looks.shape)(candidate.pixel)?;
+            centre::centre(picture, bright, &shape, candidate.pixel)
+        })
+        .collect();
+    let mut all = lattice::lattices(&marks, looks.ways).into_iter();
+    let lattice = all.next().unwrap_or_default();
+    let n_beside = all.next().map_or(0, |second| second.len());
+    if n_beside > N_BESIDE.max((BESIDE_SHARE * lattice.len() as f64) as usize) {
+        return Err(PictureError::TwoGrids { n_marks: lattice.len(), n_beside });
+    }
+    Ok(Found { bright, marks, lattice })
+}
+
+/// Finds marks whose size and direction is guessed at first, and known once their grid is.
+fn without_signs(picture: &Picture, flat: &Flat, grid: &Grid) -> Result<Found, PictureError> {
+    let limit = (MARKS_SHARE * grid.n_marks() as f64).ceil() as usize;
+    let few = PictureError::FewMarks { n_found: 0, n_marks: grid.n_marks(), limit };
+    let guess = guess::guess(flat, picture.width(), grid.style()).ok_or(few)?;
+    let shape = |_: PixelPoint| Some(guess.shape);
+    let ways = |_: PixelPoint| Some(guess.ways_px);
+    let first = indexed(picture, flat, grid, &Looks { shape: &shape, ways: &ways })?;
+    let low = grid.anchored(&first.lattice, &first.marks, None)?;
+    // As far as a camera sees them, marks are where the pattern has them.
+    let groups: Vec<Vec<Sighting>> = grid
+        .pixels(&first.lattice, &first.marks, low)
+        .into_iter()
+        .zip(&grid.marks)
+        .filter_map(|(pixel, mark)| Some(vec![Sighting { place_mm: mark.place_mm, pixel: pixel? }]))
+        .collect();
+    let size_px = [picture.width(), picture.height()];
+    let Some(fitted) = fit_view(&groups, size_px, None) else { return Ok(first) };
+    let shape = |pixel: PixelPoint| grid.shape(&fitted.view, &fitted.seen, pixel);
+    let ways = |pixel: PixelPoint| grid.ways(&fitted.view, &fitted.seen, pixel);
+    indexed(picture, flat, grid, &Looks { shape: &shape, ways: &ways })
+}
+
+/// Whether what was found may be used.
+fn judge(
+    picture: &Picture,
+    grid: &Grid,
+    found: &Found,
+    pixels: &[Option<PixelPoint>],
+) -> Result<(), PictureError> {
+    let n_found = pixels.iter().flatten().count();
+    let limit = (MARKS_SHARE * grid.n_marks() as f64).ceil() as usize;
+    let saturated = |pixel: &&PixelPoint| {
+        // The ground beside a mark, on its diagonals.
+        let off = 0.2 * grid.size_px(pixels);
+        let corners = [(off, off), (-off, off), (off, -off), (-off, -off)];
+        let places = corners.map(|(x, y)| PixelPoint::new(pixel.x_px + x, pixel.y_px + y));
+        let n_white = places.iter().filter(|place| picture.at(**place) > WHITE).count();
+        !found.bright && n_white > 2
+    };
+    let n_white = pixels.iter().flatten().filter(saturated).count();
+    let share = 100.0 * n_white as f64 / n_found.max(1) as f64;
+    if share > SATURATED_PERCENT {
+        return Err(PictureError::Saturated { share, limit: SATURATED_PERCENT });
+    }
+    let size_px = grid.size_px(pixels);
+    if n_found > 0 && size_px < SIZE_MIN_PX {
+        return Err(PictureError::Coarse { size_px, limit_px: SIZE_MIN_PX });
+    }
+    if n_found < limit {
+        return Err(PictureError::FewMarks { n_found, n_marks: grid.n_marks(), limit });
+    }
+    let limit_px = BLURRED * size_px;
+    match grid.line_width_px(picture, found.bright, pixels) {
+        Some(width_px) if width_px > limit_px => {
+            Err(PictureError::Blurred { width_px, size_px, limit_px })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn assembled(
+    grid: &Grid,
+    found: Found,
+    pixels: Vec<Option<PixelPoint>>,
+    ruler: Ruler,
+    placement: Placement,
+) -> FieldSeen {
+    let measured: Vec<Option<FieldPoint>> = match &ruler {
+        Ruler::View { seen, .. } => {
+            pixels.iter().map(|pixel| pixel.and_then(|pixel| seen.place(pixel))).collect()
+        }
+        Ruler::Scale(mm_per_px) => pixels
+            .iter()
+            .map(|pixel| pixel.map(|p| FieldPoint::new(mm_per_px * p.x_px, -mm_per_px * p.y_px)))
+            .collect(),
+    };
+    let scanned = matches!(ruler, Ruler::Scale(_));
+    let measured = match placement {
+        Placement::Sheet if !scanned => measured,
+        _ => grid.placed_by_marks(&measured),
+    };
+    let in_grid: std::collections::HashSet<usize> = found.lattice.values().copied().collect();
+    let extra = found.marks.iter().enumerate().filter(|(index, _)| !in_grid.contains(index));
+    let extra = extra.map(|(_, pixel)| *pixel).collect();
+    let mm_per_px = grid.size_mm() / grid.size_px(&pixels).max(f64::MIN_POSITIVE);
+    let marks = grid.marks.iter().zip(pixels).zip(measured);
+    let marks = marks.map(|((mark, pixel), measured_mm)| MarkSeen {
+        id: mark.id.clone(),
+        target_mm: mark.place_mm,
+        pixel,
+        measured_mm,
+    });
+    let marks = marks.collect();
+    let (view, view_rms_px, signs) = match ruler {
+        Ruler::View { view, rms_px, signs, .. } => (Some(view), rms_px, signs),
+        Ruler::Scale(_) => (None, 0.0, Vec::new()),
+    };
+    let (bright, oriented) = (found.bright, view.is_some());
+    FieldSeen { marks, signs, extra, bright, mm_per_px, view_rms_px, view, oriented }
+}
