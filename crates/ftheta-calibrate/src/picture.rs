@@ -122,6 +122,16 @@ pub struct SignSeen {
     pub kept: bool,
 }
 
+impl SignSeen {
+    /// Whether a pixel lies in the sign, or about as far from it as its white margin reaches.
+    fn holds(&self, pixel: PixelPoint) -> bool {
+        let [a, b, c, d] = self.corners;
+        let x_px = 0.25 * (a.x_px + b.x_px + c.x_px + d.x_px);
+        let y_px = 0.25 * (a.y_px + b.y_px + c.y_px + d.y_px);
+        pixel.distance(PixelPoint::new(x_px, y_px)) < 0.65 * a.distance(c)
+    }
+}
+
 /// What tells lengths in a picture.
 enum Ruler {
     /// A view of the plane, with signs if they gave it.
@@ -144,8 +154,10 @@ pub fn find_field(
     contrast(&flat)?;
     let ruler = ruler(picture, &flat, pattern, options)?;
     let found = match &ruler {
-        Ruler::View { view, seen, .. } => {
-            let shape = |pixel: PixelPoint| grid.shape(view, seen, pixel);
+        Ruler::View { view, seen, signs, .. } => {
+            let in_sign = |pixel: PixelPoint| signs.iter().any(|sign| sign.holds(pixel));
+            let shape =
+                |pixel: PixelPoint| grid.shape(view, seen, pixel).filter(|_| !in_sign(pixel));
             let ways = |pixel: PixelPoint| grid.ways(view, seen, pixel);
             indexed(picture, &flat, &grid, &Looks { shape: &shape, ways: &ways })?
         }
@@ -335,7 +347,8 @@ fn indexed(
         })
         .collect();
     let mut all = lattice::lattices(&marks, looks.ways).into_iter();
-    let lattice = all.next().unwrap_or_default();
+    let mut lattice = all.next().unwrap_or_default();
+    lattice::trim(&mut lattice, grid.size());
     let n_beside = all.next().map_or(0, |second| second.len());
     if n_beside > N_BESIDE.max((BESIDE_SHARE * lattice.len() as f64) as usize) {
         return Err(PictureError::TwoGrids { n_marks: lattice.len(), n_beside });

@@ -5,6 +5,7 @@ pub mod calibrate_delay;
 pub mod circle;
 pub mod convert;
 pub mod field;
+pub mod field_picture;
 pub mod jump;
 pub mod machine;
 pub mod mark;

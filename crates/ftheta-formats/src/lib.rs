@@ -2,6 +2,7 @@
 
 pub mod atlas_file;
 pub mod cache_key;
+pub mod camera_file;
 pub mod cor_file;
 pub mod correction_file;
 pub mod delays_file;
@@ -15,6 +16,7 @@ pub mod pattern_file;
 pub mod picture_file;
 pub mod plan_file;
 pub mod points;
+pub mod print_file;
 pub mod recipe;
 pub mod solved_file;
 pub mod svg;

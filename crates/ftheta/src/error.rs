@@ -7,6 +7,8 @@ use crate::pattern::error::PatternError;
 use crate::photograph::PhotographError;
 use ftheta_calibrate::delay::error::DelayError;
 use ftheta_calibrate::error::CalibrateError;
+use ftheta_calibrate::picture::error::PictureError;
+use ftheta_formats::camera_file::CameraFileError;
 use ftheta_formats::cor_file::CorFileError;
 use ftheta_formats::correction_file::CorrectionFileError;
 use ftheta_formats::motion_law::MotionLawError;
@@ -135,6 +137,22 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong.
         source: DelayError,
+    },
+    /// A camera file is at fault.
+    #[error("{path}: {source}", path = path.display())]
+    CameraFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: CameraFileError,
+    },
+    /// A picture gives no field.
+    #[error("{path}: {source}", path = path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong.
+        source: PictureError,
     },
     /// Measured marks give no calibration.
     #[error(transparent)]
@@ -271,6 +289,8 @@ impl Error {
                 let (place, value, limit) = source.fault();
                 (format!("{}: {place}", path.display()), value, limit)
             }
+            Self::CameraFile { path, source } => in_file(path, source.fault()),
+            Self::Picture { path, source } => in_file(path, source.fault()),
             Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
             Self::Units { path } => {
                 (path.display().to_string(), "no --units-per-mm".into(), "above 0".into())

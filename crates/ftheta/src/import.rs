@@ -1,6 +1,7 @@
 //! Reads drawings, recipes, patterns, pictures and measured points from files.
 
 use crate::Error;
+use ftheta_formats::camera_file::{self, CameraFile};
 use ftheta_formats::picture_file::{self, PictureRead};
 use ftheta_formats::{pattern_file, recipe, svg};
 use ftheta_model::calibration::MeasuredPoint;
@@ -104,6 +105,15 @@ pub fn pattern(path: &Path) -> Result<Pattern, Error> {
 pub fn picture(path: &Path) -> Result<PictureRead, Error> {
     picture_file::read(&bytes(path)?)
         .map_err(|source| Error::PictureFile { path: path.into(), source })
+}
+
+/// The camera of a camera file.
+///
+/// # Errors
+/// If the file is at fault.
+pub fn camera_file(path: &Path) -> Result<CameraFile, Error> {
+    camera_file::read(&bytes(path)?)
+        .map_err(|source| Error::CameraFile { path: path.into(), source })
 }
 
 /// What a drawing beside a pattern letters on the sheet: `grid.svg` beside `grid.json`, its layer

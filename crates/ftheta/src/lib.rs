@@ -13,6 +13,7 @@ pub mod error;
 pub mod exchange;
 pub mod field;
 pub mod field_calibration;
+pub mod field_picture;
 pub mod focus_report;
 pub mod import;
 pub mod jump;

@@ -2,6 +2,7 @@
 
 pub mod delay;
 pub mod error;
+pub mod fiducials;
 pub mod grid;
 pub mod ilda;
 pub mod sheet;

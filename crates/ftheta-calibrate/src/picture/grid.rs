@@ -98,6 +98,11 @@ impl Grid {
         self.marks.len()
     }
 
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
     /// What they are.
     pub fn style(&self) -> MarkStyle {
         self.style

@@ -10,6 +10,8 @@ use std::collections::{HashMap, VecDeque};
 /// A neighbour lies where it is expected to this part of the way, and beyond a gap.
 const GATE: f64 = 0.22;
 const GATE_BEYOND: f64 = 0.3;
+/// A row beyond the grid has no more marks than this part of a whole one.
+const STRAY: f64 = 0.3;
 /// How much of a new way is taken over from the one before.
 const KEPT: f64 = 0.5;
 
@@ -114,6 +116,23 @@ impl Near {
         let nearest = near.map(|&mark| (marks[mark].distance(place), mark));
         let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
         (nearest.0 < limit_px).then_some(nearest.1)
+    }
+}
+
+/// Takes off outermost columns and rows with few marks while there are more than `size` of them:
+/// dirt or lettering that happens to be in line.
+pub fn trim(lattice: &mut Lattice, size: [usize; 2]) {
+    loop {
+        let (low, found) = extent(lattice);
+        let Some(axis) = (0..2).find(|&axis| found[axis] > size[axis]) else { return };
+        let at = |key: &(i32, i32)| [key.0, key.1][axis];
+        let count = |line: i32| lattice.keys().filter(|key| at(key) == line).count();
+        let (first, last) = (low[axis], low[axis] + found[axis] as i32 - 1);
+        let line = if count(first) < count(last) { first } else { last };
+        if count(line) as f64 > STRAY * size[1 - axis] as f64 {
+            return;
+        }
+        lattice.retain(|key, _| at(key) != line);
     }
 }
 

@@ -5,6 +5,7 @@ use super::photograph::TwinPhotograph;
 use super::{noise, positive};
 use clap::{Args, Subcommand, ValueEnum};
 use ftheta::calibrate::calibrate::Model;
+use ftheta::calibrate::picture::Placement;
 use ftheta::physics::grid_map::Interpolation;
 use std::path::PathBuf;
 
@@ -30,6 +31,8 @@ pub enum CalibrateAction {
 Examples:
   ftheta calibrate field --machine S14-f420 --points grid.csv --out table.txt
   ftheta calibrate field --machine S14-f420 --points grid.csv --model polynomial --out table.cor
+  ftheta calibrate field --machine S14-f420 --image photo.jpg --pattern grid.json \\
+      --sheet-x-mm 270.6 --sheet-y-mm 269.3 --out table.txt
 
 The points are target_x_mm,target_y_mm,measured_x_mm,measured_y_mm[,round]. calibration.html,
 written beside the table, shows what was found and what to do next.")]
@@ -37,9 +40,11 @@ pub struct CalibrateField {
     /// Preset (see `ftheta machine list`) or machine file.
     #[arg(long, default_value = "S10", value_name = "NAME|FILE")]
     pub machine: String,
-    /// Table of measured marks.
-    #[arg(long, value_name = "CSV")]
-    pub points: PathBuf,
+    /// Table of measured marks; with --image, of the rounds before.
+    #[arg(long, value_name = "CSV", required_unless_present_any = ["image", "camera"])]
+    pub points: Option<PathBuf>,
+    #[command(flatten)]
+    pub picture: PictureArguments,
     /// What the error of the field is described by.
     #[arg(long, value_enum, default_value = "auto")]
     pub model: ModelName,
@@ -63,6 +68,56 @@ pub struct CalibrateField {
     /// Table to write: .txt, .cor (EZCAD) or .csv (grid of offsets).
     #[arg(long, value_name = "TABLE")]
     pub out: PathBuf,
+}
+
+/// Pictures of a marked grid.
+#[derive(Args)]
+pub struct PictureArguments {
+    /// Picture of the marked grid, PNG, JPEG or TIFF; several of the same plate are averaged.
+    #[arg(long, value_name = "PICTURE", requires = "pattern")]
+    pub image: Vec<PathBuf>,
+    /// Take the picture with a camera of this computer, as /dev/video0.
+    #[arg(long, value_name = "DEVICE", conflicts_with = "image", requires = "pattern")]
+    pub camera: Option<String>,
+    /// The pattern's .json, for pictures.
+    #[arg(long, value_name = "JSON")]
+    pub pattern: Option<PathBuf>,
+    /// What the printed sheet's line along x measures, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sheet_x_mm: Option<f64>,
+    /// What the printed sheet's line along y measures, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sheet_y_mm: Option<f64>,
+    /// The camera's lens, and its view if it stands still, as `ftheta calibrate camera` wrote it.
+    #[arg(long, value_name = "JSON")]
+    pub camera_file: Option<PathBuf>,
+    /// Side of a pixel, µm, of a flatbed scanner's picture; no sheet is needed then.
+    #[arg(long, value_name = "S", value_parser = positive,
+          conflicts_with_all = ["camera_file", "sheet_x_mm", "sheet_y_mm"])]
+    pub um_per_px: Option<f64>,
+    /// Whether the sheet lies true on the machine's axes, or was laid by hand.
+    #[arg(long, value_enum, default_value = "marks")]
+    pub placement: PlacementName,
+    /// Table of the measured marks to write.
+    #[arg(long, value_name = "CSV")]
+    pub points_out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum PlacementName {
+    /// Place and turn of the field are left as they are.
+    Marks,
+    /// The field is brought to the sheet.
+    Sheet,
+}
+
+impl From<PlacementName> for Placement {
+    fn from(name: PlacementName) -> Self {
+        match name {
+            PlacementName::Marks => Self::Marks,
+            PlacementName::Sheet => Self::Sheet,
+        }
+    }
 }
 
 #[derive(Args)]

@@ -103,6 +103,10 @@ pub struct GridPattern {
     /// given.
     #[arg(long, value_name = "S", value_parser = positive)]
     pub size_mm: Option<f64>,
+    /// Also a sheet to be printed (.sheet.pdf, .sheet.svg), with signs around the grid by which a
+    /// photograph can be measured: `ftheta calibrate field --image`.
+    #[arg(long)]
+    pub fiducials: bool,
 }
 
 #[derive(Args)]

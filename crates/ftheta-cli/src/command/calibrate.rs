@@ -3,7 +3,7 @@
 use crate::arguments::calibrate::{
     Calibrate, CalibrateAction, CalibrateDrift, CalibrateField, Twin, TwinAction, TwinMeasure,
 };
-use crate::command::calibrate_delay;
+use crate::command::{calibrate_delay, field_picture};
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::{note, say};
@@ -14,7 +14,10 @@ use ftheta::calibrate::table::Grid;
 use ftheta::field_calibration::{
     FieldCalibration, FieldOptions, MarkedThrough, calibrate_drift, calibrate_field,
 };
+use ftheta::field_picture::FieldPicture;
 use ftheta::formats::cor_file::CorVersion;
+use ftheta::formats::points;
+use ftheta::model::calibration::MeasuredPoint;
 use ftheta::model::machine::Machine;
 use ftheta::model::warning::{Imported, Warning};
 use ftheta::output::write_file;
@@ -42,8 +45,7 @@ pub fn run_twin(arguments: &Twin, as_json: bool) -> Result<(), Error> {
 
 fn run_field(arguments: &CalibrateField, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(&arguments.machine)?;
-    let Imported { value: points, mut warnings } =
-        import::measured_points(&arguments.points, arguments.units_per_mm)?;
+    let Measured { points, mut warnings, pictures } = measured(arguments)?;
     let through = arguments.marked_through.iter().map(|name| marked_through(name, &machine));
     let options = FieldOptions {
         calibrate: CalibrateOptions {
@@ -61,13 +63,51 @@ fn run_field(arguments: &CalibrateField, as_json: bool) -> Result<(), Error> {
     tables::write(&field.table, &machine, &arguments.out, CorVersion::Two)?;
     let report = arguments.out.with_file_name("calibration.html");
     write_file(&report, field.report(&machine.name).as_bytes())?;
-    let files =
-        [("table", arguments.out.display().to_string()), ("report", report.display().to_string())];
-    match as_json {
-        true => json::print(&object(&field, &machine, &warnings, &files)),
-        false => print(&field, &warnings, &files),
+    let mut files = vec![
+        ("table", arguments.out.display().to_string()),
+        ("report", report.display().to_string()),
+    ];
+    files.extend(
+        arguments.picture.points_out.iter().map(|path| ("points", path.display().to_string())),
+    );
+    if as_json {
+        let mut value = object(&field, &machine, &warnings, &files);
+        if !pictures.is_empty() {
+            value["pictures"] = pictures.iter().map(field_picture::object).collect();
+        }
+        json::print(&value);
+        return Ok(());
     }
+    pictures.iter().for_each(field_picture::print);
+    print(&field, &warnings, &files);
     Ok(())
+}
+
+/// What a calibration is made from.
+struct Measured {
+    points: Vec<MeasuredPoint>,
+    warnings: Vec<Warning>,
+    pictures: Vec<FieldPicture>,
+}
+
+/// Points from the table, and from pictures as the round after it.
+fn measured(arguments: &CalibrateField) -> Result<Measured, Error> {
+    let table = arguments.points.as_deref();
+    let table = table.map(|path| import::measured_points(path, arguments.units_per_mm));
+    let Imported { value: mut points, mut warnings } =
+        table.unwrap_or_else(|| Ok(Imported { value: Vec::new(), warnings: Vec::new() }))?;
+    let pictures = field_picture::measure(&arguments.picture)?;
+    let round = 1 + points.iter().map(|point| point.round).max().unwrap_or(0);
+    let seen = ftheta::field_picture::points(&pictures, round);
+    if let Some(path) = &arguments.picture.points_out {
+        let rows = seen.iter().map(|(id, point)| {
+            (id.as_str(), point.target_mm, point.round, Some(point.measured_mm))
+        });
+        write_file(path, points::write(rows).as_bytes())?;
+    }
+    points.extend(seen.into_iter().map(|(_, point)| point));
+    warnings.extend(pictures.iter().flat_map(|picture| picture.warnings.clone()));
+    Ok(Measured { points, warnings, pictures })
 }
 
 fn marked_through(name: &str, machine: &Machine) -> Result<MarkedThrough, Error> {

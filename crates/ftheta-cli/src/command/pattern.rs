@@ -15,6 +15,7 @@ use ftheta::model::pattern::LaserDelays;
 use ftheta::model::recipe::Pen;
 use ftheta::output::{Output, write_file};
 use ftheta::pattern::delay::{self, DelayOptions, LineAxis, Method};
+use ftheta::pattern::fiducials;
 use ftheta::pattern::grid::{self, GridOptions};
 use ftheta::pattern::ilda::{Comparison, Ilda, PatternOptions, Way, compare};
 use ftheta::pattern::sheet::{Sheet, SheetProcess};
@@ -44,7 +45,11 @@ fn run_grid(arguments: &GridPattern, as_json: bool) -> Result<(), Error> {
         size_mm: arguments.size_mm,
         process,
     };
-    write_sheet(&grid::sheet(&options, &machine)?, out, as_json)
+    let mut made = grid::sheet(&options, &machine)?;
+    if arguments.fiducials {
+        made = fiducials::around(made)?;
+    }
+    write_sheet(&made, out, as_json)
 }
 
 fn run_square(arguments: &SquarePattern, as_json: bool) -> Result<(), Error> {
@@ -99,6 +104,10 @@ fn write_sheet(sheet: &Sheet, out: &Path, as_json: bool) -> Result<(), Error> {
             "field_mm": pattern.field_mm,
             "features": pattern.features.len(),
             "points": sheet.places.len(),
+            "sheet": sheet.printed.as_ref().map(|printed| json!({
+                "paper": printed.paper,
+                "line_mm": printed.line_mm,
+            })),
             "files": json::files(&files),
         }));
         return Ok(());
@@ -109,6 +118,10 @@ fn write_sheet(sheet: &Sheet, out: &Path, as_json: bool) -> Result<(), Error> {
         pattern.field_mm,
         sheet.places.len()
     );
+    if let Some(printed) = &sheet.printed {
+        let (paper, line_mm) = (printed.paper, printed.line_mm);
+        say!("sheet    print it on {paper} at 100 %, and measure both lines of {line_mm} mm");
+    }
     for (kind, path) in files {
         say!("{kind:8} {path}");
     }

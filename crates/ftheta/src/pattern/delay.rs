@@ -142,7 +142,14 @@ pub fn sheet(options: &DelayOptions, machine: &Machine) -> Result<Sheet, Pattern
         laser: Some(LaserDelays { on_us: own.on_us + on_us, off_us: own.off_us + off_us }),
     };
     let job = job(options, &lines, &labels, turn, reach_mm);
-    Ok(Sheet { pattern, job, hatch_spacing_mm: None, keep_order: true, places: Vec::new() })
+    Ok(Sheet {
+        pattern,
+        job,
+        hatch_spacing_mm: None,
+        keep_order: true,
+        places: Vec::new(),
+        printed: None,
+    })
 }
 
 fn check(options: &DelayOptions) -> Result<(), PatternError> {

@@ -32,6 +32,17 @@ pub enum PatternError {
         /// Side of the machine's field, mm.
         limit_mm: f64,
     },
+    /// A sheet larger than paper.
+    #[error(
+        "the sheet would be {reach_mm:.0} mm wide, the largest paper is {limit_mm:.0} mm: take a \
+         smaller --field"
+    )]
+    Paper {
+        /// Its side, mm.
+        reach_mm: f64,
+        /// Shorter side of the paper, mm.
+        limit_mm: f64,
+    },
     /// An option out of its range.
     #[error("{option} is {value} {unit}, expected {} to {}", limits[0], limits[1])]
     Option {
@@ -105,6 +116,7 @@ impl PatternError {
             Self::Points { letter_mm, limit_mm, .. } => {
                 ("--points".into(), mm(letter_mm), mm(limit_mm))
             }
+            Self::Paper { reach_mm, limit_mm } => ("--field".into(), mm(reach_mm), mm(limit_mm)),
             Self::DelayField { reach_mm, limit_mm } => ("field".into(), mm(reach_mm), mm(limit_mm)),
             Self::Option { option, value, unit, limits: [least, most] } => (
                 (*option).into(),

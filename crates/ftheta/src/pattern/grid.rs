@@ -75,7 +75,7 @@ pub fn sheet(options: &GridOptions, machine: &Machine) -> Result<Sheet, PatternE
         ..Sheet::new_job(&options.process, side_mm)
     };
     let hatch_spacing_mm = Some(HATCH_SPOTS * machine.laser.spot_diameter_mm);
-    Ok(Sheet { pattern, job, hatch_spacing_mm, keep_order: false, places })
+    Ok(Sheet { pattern, job, hatch_spacing_mm, keep_order: false, places, printed: None })
 }
 
 /// The name of a mark: letters of its column, number of its row from 1.

@@ -1,9 +1,10 @@
 //! A pattern as files: drawing, recipe, nominal places, and a table to fill in.
 
+use super::fiducials::Printed;
 use crate::output::Output;
 use crate::{Error, convert, import};
 use ftheta_formats::text::hershey;
-use ftheta_formats::{pattern_file, points, svg_write};
+use ftheta_formats::{pattern_file, points, print_file, svg_write};
 use ftheta_model::job::{Job, Layer, Paint, Shape};
 use ftheta_model::machine::{Laser, Machine};
 use ftheta_model::pattern::{LaserDelays, Pattern};
@@ -39,6 +40,8 @@ pub struct Sheet {
     pub keep_order: bool,
     /// Places to measure, each with its name.
     pub places: Vec<(String, FieldPoint)>,
+    /// A sheet to be printed and laid below the plate.
+    pub printed: Option<Printed>,
 }
 
 impl SheetProcess {
@@ -71,8 +74,8 @@ impl Sheet {
         Job { pens: vec![pen], layers: Vec::new(), page_mm: [side_mm; 2] }
     }
 
-    /// Writes `OUT` (the drawing) and beside it `.json`, `.recipe.toml`, and `.csv` if there are
-    /// places to measure; returns kind and path of each.
+    /// Writes `OUT` (the drawing) and beside it `.json`, `.recipe.toml`, `.csv` if there are places
+    /// to measure, `.sheet.pdf` and `.sheet.svg` if there is a sheet; returns kind and path of each.
     ///
     /// # Errors
     /// If a file cannot be written, `out` does not end in `.svg`, or the table beside it has been
@@ -87,16 +90,21 @@ impl Sheet {
         let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
         let mut output = Output::new(folder.unwrap_or(Path::new(".")))?;
         let mut files = vec![
-            ("drawing", out.to_path_buf(), svg_write::to_svg(&self.job)),
-            ("recipe", out.with_extension("recipe.toml"), self.recipe()),
-            ("features", out.with_extension("json"), pattern_file::write(&self.pattern)),
+            ("drawing", out.to_path_buf(), svg_write::to_svg(&self.job).into_bytes()),
+            ("recipe", out.with_extension("recipe.toml"), self.recipe().into_bytes()),
+            ("features", out.with_extension("json"), pattern_file::write(&self.pattern).into()),
         ];
         if !self.places.is_empty() {
-            files.push(("points", table, self.table()));
+            files.push(("points", table, self.table().into_bytes()));
+        }
+        if let Some(Printed { print, .. }) = &self.printed {
+            files.push(("print", out.with_extension("sheet.pdf"), print_file::to_pdf(print)));
+            let svg = print_file::to_svg(print).into_bytes();
+            files.push(("print", out.with_extension("sheet.svg"), svg));
         }
         for (_, path, content) in &files {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            output.add(&name, |out| out.write_all(content.as_bytes()))?;
+            output.add(&name, |out| out.write_all(content))?;
         }
         output.publish()?;
         let written = files.into_iter();

@@ -76,5 +76,5 @@ pub fn sheet(
     });
     let places = places.collect();
     let job = Job { layers, ..Sheet::new_job(process, field_mm) };
-    Ok(Sheet { pattern, job, hatch_spacing_mm: None, keep_order: false, places })
+    Ok(Sheet { pattern, job, hatch_spacing_mm: None, keep_order: false, places, printed: None })
 }
