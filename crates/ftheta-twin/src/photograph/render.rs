@@ -11,6 +11,8 @@ use std::thread;
 
 /// Side of the squares within which places are interpolated and things are looked up, px.
 const TILE: usize = 8;
+/// Parts of a pixel along each side that are told from each other.
+pub(super) const FINE: usize = 2;
 /// Longest piece of a thing that is looked up by its bounding box, px.
 const PIECE_PX: f64 = 24.0;
 /// Dose over the threshold that is too little to matter beside another line.
@@ -59,16 +61,19 @@ struct Tile {
 }
 
 impl Scene {
-    /// Brightness of every pixel, row by row: the mean over its area.
+    /// Brightness of the quarters of every pixel, row by row of quarters: the mean over its area.
+    ///
+    /// A lens blurs before a pixel gathers light, so that a line thinner than a pixel still moves
+    /// its middle by less than one: what blurs has to see finer than pixels.
     pub(super) fn radiance(&self, camera: &Camera) -> Vec<f32> {
-        let (width, height) = (camera.width, camera.height);
-        let n_columns = width.div_ceil(TILE);
+        let (width, height) = (FINE * camera.width, FINE * camera.height);
+        let n_columns = camera.width.div_ceil(TILE);
         let rendering = Rendering { scene: self, camera, reach_mm: self.reach_mm() };
         let tiles = rendering.tiles();
         let mut picture = vec![0.0; width * height];
         let n_threads = thread::available_parallelism().map_or(1, NonZero::get);
         let mut bands: Vec<Vec<(usize, &mut [f32])>> = (0..n_threads).map(|_| Vec::new()).collect();
-        for (row, band) in picture.chunks_mut(TILE * width).enumerate() {
+        for (row, band) in picture.chunks_mut(FINE * TILE * width).enumerate() {
             bands[row % n_threads].push((row, band));
         }
         thread::scope(|scope| {
@@ -103,7 +108,8 @@ impl Rendering<'_> {
     /// Renders a row of tiles.
     fn band(&self, row: usize, tiles: &[Tile], pixels: &mut [f32]) {
         let camera = self.camera;
-        let n_rows = pixels.len() / camera.width;
+        let width = FINE * camera.width;
+        let n_rows = pixels.len() / width / FINE;
         for (column, tile) in tiles.iter().enumerate() {
             let (x0, y0) = ((column * TILE) as f64 - 0.5, (row * TILE) as f64 - 0.5);
             let side = TILE as f64;
@@ -118,15 +124,23 @@ impl Rendering<'_> {
             for y in 0..n_rows {
                 for x in 0..TILE.min(camera.width - column * TILE) {
                     let at = |i: f64, j: f64| place(x as f64 + i, y as f64 + j);
-                    let value = self.pixel(tile, &at, pixel_mm);
-                    pixels[y * camera.width + column * TILE + x] = value as f32;
+                    let quarters = self.quarters(tile, &at, pixel_mm);
+                    for (index, value) in quarters.into_iter().enumerate() {
+                        let x = FINE * (column * TILE + x) + index % FINE;
+                        pixels[(FINE * y + index / FINE) * width + x] = value as f32;
+                    }
                 }
             }
         }
     }
 
-    /// Mean brightness of a pixel; `at` gives its places from (0, 0) to (1, 1).
-    fn pixel(&self, tile: &Tile, at: &dyn Fn(f64, f64) -> Point, pixel_mm: f64) -> f64 {
+    /// Mean brightness of a pixel's quarters; `at` gives its places from (0, 0) to (1, 1).
+    fn quarters(
+        &self,
+        tile: &Tile,
+        at: &dyn Fn(f64, f64) -> Point,
+        pixel_mm: f64,
+    ) -> [f64; FINE * FINE] {
         let centre = at(0.5, 0.5);
         let Look { plate, texture, seed, .. } = self.scene.look;
         let uneven = 0.6 * grain(centre, FINE_MM.max(pixel_mm), seed)
@@ -140,20 +154,25 @@ impl Rendering<'_> {
             .filter(|segment| segment.distance_mm(centre) < reach_mm)
             .collect();
         if near.is_empty() && tile.prints.is_empty() {
-            return plate;
+            return [plate; FINE * FINE];
         }
-        let across = (pixel_mm / (0.15 * self.scene.spot_radius_mm)).ceil().clamp(2.0, 8.0);
-        let n = if near.is_empty() { 3 } else { across as usize };
-        let (step, side_mm) = (1.0 / n as f64, pixel_mm / n as f64);
-        let mut sum = 0.0;
-        for index in 0..n * n {
-            let place = at(((index % n) as f64 + 0.5) * step, ((index / n) as f64 + 0.5) * step);
-            let prints = tile.prints.iter().map(|&index| &self.scene.prints[index as usize]);
-            let below = plate + prints.map(|print| print.change_at(place, side_mm)).sum::<f64>();
-            let burned = self.burned(&near, place, side_mm);
-            sum += below + burned * (self.scene.look.burned - below);
-        }
-        sum / (n * n) as f64
+        let across = pixel_mm / (0.15 * self.scene.spot_radius_mm) / FINE as f64;
+        let n = if near.is_empty() { 2 } else { across.ceil().clamp(1.0, 4.0) as usize };
+        let (step, side_mm) = (1.0 / (n * FINE) as f64, pixel_mm / (n * FINE) as f64);
+        std::array::from_fn(|quarter| {
+            let (left, top) = ((quarter % FINE * n) as f64, (quarter / FINE * n) as f64);
+            let mut sum = 0.0;
+            for index in 0..n * n {
+                let (x, y) = ((index % n) as f64 + 0.5, (index / n) as f64 + 0.5);
+                let place = at((left + x) * step, (top + y) * step);
+                let prints = tile.prints.iter().map(|&index| &self.scene.prints[index as usize]);
+                let below =
+                    plate + prints.map(|print| print.change_at(place, side_mm)).sum::<f64>();
+                let burned = self.burned(&near, place, side_mm);
+                sum += below + burned * (self.scene.look.burned - below);
+            }
+            sum / (n * n) as f64
+        })
     }
 
     /// How far a small square is burned, 0 to 1: its share over the threshold, times how dark that

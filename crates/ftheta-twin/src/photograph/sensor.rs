@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::print::uniform;
-use super::render::Scene;
+use super::render::{FINE, Scene};
 use ftheta_model::picture::Picture;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -43,15 +43,16 @@ pub struct Sensor {
 /// The picture that the camera takes, in 256 shades; the same on any number of threads.
 pub fn expose(scene: &Scene, camera: &Camera, sensor: &Sensor) -> Picture {
     let (width, height) = (camera.width, camera.height);
-    let mut light = scene.radiance(camera);
+    let mut fine = scene.radiance(camera);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(sensor.seed ^ 0x7365_6e73_6f72);
     let from_rad = TAU * uniform(&mut random);
     // Where a reflection is, of the half diagonal from the middle.
     let glare = [uniform(&mut random) - 0.5, uniform(&mut random) - 0.5];
     for _ in 0..sensor.n_dirt {
-        drop_dirt(&mut light, [width, height], &mut random);
+        drop_dirt(&mut fine, [width, height], &mut random);
     }
-    blur(&mut light, width, sensor.blur_px);
+    let mut light = gathered(&fine, width, sensor.blur_px);
+    drop(fine);
     let radius_px = 0.5 * (width as f64).hypot(height as f64);
     let (sin, cos) = from_rad.sin_cos();
     for (y, row) in light.chunks_mut(width).enumerate() {
@@ -78,57 +79,94 @@ pub fn expose(scene: &Scene, camera: &Camera, sensor: &Sensor) -> Picture {
     Picture::new(width, height, light).expect("a camera has pixels, and each has its light")
 }
 
-/// A speck or a fibre somewhere in the picture.
-fn drop_dirt(light: &mut [f32], [width, height]: [usize; 2], random: &mut Xoshiro256PlusPlus) {
+/// A speck or a fibre somewhere in a picture of this size, as parts of pixels.
+fn drop_dirt(fine: &mut [f32], [width, height]: [usize; 2], random: &mut Xoshiro256PlusPlus) {
     let mut unit = || uniform(random);
     let centre = [unit() * width as f64, unit() * height as f64];
     let is_fibre = unit() < 0.5;
     let radius_px = if is_fibre { 0.8 + 0.8 * unit() } else { 1.0 + 4.0 * unit() };
     let length_px = if is_fibre { 8.0 + 40.0 * unit() } else { 2.0 * unit() };
     let (sin, cos) = (TAU * unit()).sin_cos();
-    let reach_px = (radius_px + 0.5 * length_px + 1.0).ceil() as i64;
-    let at = centre.map(|px| px as i64);
-    for y in (at[1] - reach_px).max(0)..(at[1] + reach_px).min(height as i64) {
-        for x in (at[0] - reach_px).max(0)..(at[0] + reach_px).min(width as i64) {
-            let (dx, dy) = (x as f64 - centre[0], y as f64 - centre[1]);
+    let reach = FINE as i64 * (radius_px + 0.5 * length_px + 1.0).ceil() as i64;
+    let at = centre.map(|px| FINE as i64 * px as i64);
+    let [width, height] = [width, height].map(|side| FINE * side);
+    let px = |index: i64| (index as f64 + 0.5) / FINE as f64 - 0.5;
+    for y in (at[1] - reach).max(0)..(at[1] + reach).min(height as i64) {
+        for x in (at[0] - reach).max(0)..(at[0] + reach).min(width as i64) {
+            let (dx, dy) = (px(x) - centre[0], px(y) - centre[1]);
             let along = dx * cos + dy * sin;
             let beyond = along - along.clamp(-0.5 * length_px, 0.5 * length_px);
             let distance_px = beyond.hypot(dy * cos - dx * sin);
             let share = (radius_px + 0.5 - distance_px).clamp(0.0, 1.0) as f32;
-            let value = &mut light[y as usize * width + x as usize];
+            let value = &mut fine[y as usize * width + x as usize];
             *value += share * (DIRT - *value);
         }
     }
 }
 
-/// Gaussian blur, along rows and then along columns; the border goes on beyond the picture.
-fn blur(light: &mut [f32], width: usize, sigma_px: f64) {
-    if sigma_px <= 0.0 {
-        return;
+/// Light of every pixel from that of its parts: blurred by the lens, then gathered. The border goes
+/// on beyond the picture.
+fn gathered(fine: &[f32], width: usize, sigma_px: f64) -> Vec<f32> {
+    let weights = gathering(sigma_px);
+    let n_fine = FINE * width;
+    let n_rows = fine.len() / n_fine;
+    // From so many parts before a pixel's first on.
+    let before = (weights.len() - FINE) / 2;
+    let mut along = Vec::with_capacity(n_rows * width);
+    for row in fine.chunks(n_fine) {
+        along.extend((0..width).map(|x| {
+            let at = |i: usize| row[(FINE * x + i).saturating_sub(before).min(n_fine - 1)];
+            weights.iter().enumerate().map(|(i, weight)| weight * at(i)).sum::<f32>()
+        }));
     }
-    let reach = (4.0 * sigma_px).ceil() as usize;
-    let weights: Vec<f64> =
-        (0..=reach).map(|i| (-0.5 * (i as f64 / sigma_px).powi(2)).exp()).collect();
-    let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
-    let weights: Vec<f32> = weights.iter().map(|weight| (weight / sum) as f32).collect();
-    let height = light.len() / width;
-    let mut along = vec![0.0; light.len()];
-    for (from, to) in light.chunks(width).zip(along.chunks_mut(width)) {
-        for (x, value) in to.iter_mut().enumerate() {
-            *value = weights[0] * from[x];
-            for (i, weight) in weights.iter().enumerate().skip(1) {
-                *value += weight * (from[x.saturating_sub(i)] + from[(x + i).min(width - 1)]);
-            }
-        }
-    }
+    let mut light = vec![0.0; n_rows / FINE * width];
     for (y, to) in light.chunks_mut(width).enumerate() {
-        let row = |y: usize| &along[y * width..(y + 1) * width];
-        to.iter_mut().zip(row(y)).for_each(|(value, from)| *value = weights[0] * from);
-        for (i, weight) in weights.iter().enumerate().skip(1) {
-            let (above, below) = (row(y.saturating_sub(i)), row((y + i).min(height - 1)));
-            for (value, (a, b)) in to.iter_mut().zip(above.iter().zip(below)) {
-                *value += weight * (a + b);
-            }
+        for (i, weight) in weights.iter().enumerate() {
+            let row = (FINE * y + i).saturating_sub(before).min(n_rows - 1);
+            let from = &along[row * width..(row + 1) * width];
+            to.iter_mut().zip(from).for_each(|(value, from)| *value += weight * from);
         }
+    }
+    light
+}
+
+/// Weights with which a pixel gathers light from its own parts and those beside: a Gaussian, summed
+/// over the pixel's parts.
+fn gathering(sigma_px: f64) -> Vec<f32> {
+    let sigma = FINE as f64 * sigma_px;
+    let reach = (4.0 * sigma).ceil() as usize;
+    let bell = |i: f64| if sigma > 0.0 { (-0.5 * (i / sigma).powi(2)).exp() } else { 1.0 };
+    let mut weights = vec![0.0; 2 * reach + FINE];
+    for part in 0..FINE {
+        for (i, weight) in weights[part..].iter_mut().take(2 * reach + 1).enumerate() {
+            *weight += bell(i as f64 - reach as f64);
+        }
+    }
+    let sum: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| (weight / sum) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A line of half a pixel keeps its place, wherever it lies in the pixels.
+    #[test]
+    fn thin_lines_do_not_snap_to_pixels() {
+        let width = 24;
+        for parts in 0..4 {
+            let mut fine = vec![0.0; FINE * width * FINE];
+            for row in fine.chunks_mut(FINE * width) {
+                row[22 + parts] = 1.0;
+            }
+            let light = gathered(&fine, width, 0.8);
+            let sum: f32 = light[..width].iter().sum();
+            let moment: f32 = (0..width).map(|x| x as f32 * light[x]).sum();
+            let expected = (22 + parts) as f32 * 0.5 - 0.25;
+            assert!((moment / sum - expected).abs() < 1e-3, "{} {expected}", moment / sum);
+            assert!((sum - 0.5).abs() < 1e-5, "{sum}");
+        }
+        let plain = gathered(&[0.0, 1.0, 0.0, 1.0], 1, 0.0);
+        assert_eq!(plain, [0.5]);
     }
 }
