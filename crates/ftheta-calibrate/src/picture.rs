@@ -123,12 +123,14 @@ pub struct SignSeen {
 }
 
 impl SignSeen {
-    /// Whether a pixel lies in the sign, or about as far from it as its white margin reaches.
+    /// Whether a pixel lies in the sign.
     fn holds(&self, pixel: PixelPoint) -> bool {
-        let [a, b, c, d] = self.corners;
-        let x_px = 0.25 * (a.x_px + b.x_px + c.x_px + d.x_px);
-        let y_px = 0.25 * (a.y_px + b.y_px + c.y_px + d.y_px);
-        pixel.distance(PixelPoint::new(x_px, y_px)) < 0.65 * a.distance(c)
+        let corners = &self.corners;
+        (0..4).all(|index| {
+            let (a, b) = (corners[index], corners[(index + 1) % 4]);
+            // Clockwise with y down, the inside is to the right.
+            (b.x_px - a.x_px) * (pixel.y_px - a.y_px) > (b.y_px - a.y_px) * (pixel.x_px - a.x_px)
+        })
     }
 }
 

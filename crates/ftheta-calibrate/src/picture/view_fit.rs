@@ -7,12 +7,13 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Size of places that keeps numbers near one, mm.
 const SCALE_MM: f64 = 100.0;
-/// What a sighting is off, px rms: what priors are weighed against.
-const SIGHTING_PX: f64 = 0.1;
+/// What a sighting is off, px rms: what priors are weighed against. Printed signs are off as a
+/// whole, so the four corners of one say no more than one of them would.
+const SIGHTING_PX: f64 = 0.3;
 /// What lenses are like, as priors: radial, tangential, centre off the middle by the focal length.
-const RADIAL: f64 = 0.3;
-const TANGENTIAL: f64 = 0.005;
-const CENTRE: f64 = 0.03;
+const RADIAL: f64 = 0.2;
+const TANGENTIAL: f64 = 0.0005;
+const CENTRE: f64 = 0.005;
 /// With fewer sightings a lens' higher terms are left alone.
 const N_FREE: usize = 48;
 /// A group is left out if it is so many times as far off as the usual one, and by this much, px.

@@ -14,14 +14,16 @@ use kurbo::{Affine, BezPath, Point, Rect};
 /// Signs along each side, both corners among them.
 const N_SIDE: usize = 11;
 /// Side of a sign by that of the field, and its limits, mm.
-const SIGN: f64 = 0.0375;
+const SIGN: f64 = 0.0325;
 const SIGN_MM: [f64; 2] = [5.0, 12.0];
-/// From the outermost marks to the plate's edge, and from there to the signs' white, mm.
+/// From the outermost marks to the plate's edge: what heads are off, by the field and at least, mm.
+const PLATE: f64 = 0.02;
 const PLATE_MM: f64 = 3.0;
-const GAP_MM: f64 = 1.0;
+/// From there to the signs' white, mm.
+const GAP_MM: f64 = 0.5;
 /// From the signs to the lines, from the lines to the paper's edge, mm.
-const LINE_GAP_MM: f64 = 3.0;
-const MARGIN_MM: f64 = 5.0;
+const LINE_GAP_MM: f64 = 2.0;
+const MARGIN_MM: f64 = 4.0;
 /// Lines are whole multiples of this long, mm, this wide, and have bars of this length.
 const LINE_STEP_MM: f64 = 10.0;
 const LINE_WIDTH_MM: f64 = 0.25;
@@ -56,7 +58,7 @@ pub fn around(mut grid: Sheet) -> Result<Sheet, PatternError> {
     let side_mm = grid.job.page_mm[0];
     let sign_mm = (SIGN * side_mm).clamp(SIGN_MM[0], SIGN_MM[1]);
     let cell_mm = sign_mm / tag::N_CELLS as f64;
-    let plate_mm = 0.5 * side_mm + PLATE_MM;
+    let plate_mm = 0.5 * side_mm + (PLATE * side_mm).max(PLATE_MM);
     let ring_mm = plate_mm + GAP_MM + cell_mm + 0.5 * sign_mm;
     let edge_mm = ring_mm + 0.5 * sign_mm + cell_mm;
     grid.pattern.features.extend(signs(ring_mm, sign_mm));
