@@ -6,6 +6,7 @@ mod maps;
 
 use crate::cards::{Card, draw};
 use crate::jump_report::header;
+use crate::picture_view::{self, PictureView, SightKind};
 use crate::text::{escaped, number, put};
 use ftheta_model::space::FieldPoint;
 use ftheta_model::warning::Warning;
@@ -40,6 +41,8 @@ pub struct CalibrationReportInput<'a> {
     pub advice: &'a [String],
     /// What was noticed on the way.
     pub warnings: &'a [Warning],
+    /// Pictures that the points were measured in, with captions.
+    pub pictures: &'a [(String, PictureView<'a>)],
 }
 
 /// A measured point.
@@ -144,6 +147,7 @@ pub fn calibration_report_html(input: &CalibrationReportInput<'_>) -> String {
         format_args!("<p class=note style='margin-top:16px'>{}.</p>", escaped(input.why)),
     );
     next(&mut out, input.advice);
+    pictures(&mut out, input.pictures);
     arrows::before_and_after(&mut out, input);
     maps::residual_and_expected(&mut out, input);
     outliers(&mut out, input.points);
@@ -188,7 +192,8 @@ fn cards(out: &mut String, input: &CalibrationReportInput<'_>) {
     );
 }
 
-fn next(out: &mut String, advice: &[String]) {
+/// What to do next, as a list.
+pub(crate) fn next(out: &mut String, advice: &[String]) {
     if advice.is_empty() {
         return;
     }
@@ -197,6 +202,29 @@ fn next(out: &mut String, advice: &[String]) {
         put(out, format_args!("<li>{}.</li>", escaped(sentence)));
     }
     out.push_str("</ol></section>");
+}
+
+fn pictures(out: &mut String, pictures: &[(String, PictureView<'_>)]) {
+    if pictures.is_empty() {
+        return;
+    }
+    out.push_str("<section><h2>What was found in the picture</h2>");
+    out.push_str(&picture_view::key([
+        (SightKind::Used, "marks and signs that were used"),
+        (SightKind::LeftOut, "left out or not found"),
+        (SightKind::Extra, "looks like a mark and is none of the grid"),
+    ]));
+    for (caption, view) in pictures {
+        put(
+            out,
+            format_args!(
+                "<figure>{}<figcaption class=note>{}</figcaption></figure>",
+                picture_view::svg(view),
+                escaped(caption)
+            ),
+        );
+    }
+    out.push_str("</section>");
 }
 
 fn outliers(out: &mut String, points: &[ReportPoint]) {
@@ -264,7 +292,8 @@ fn value_text(value: f64, sigma: Option<f64>) -> String {
     if value.is_finite() { format!("{value:.n_decimals$}") } else { "–".into() }
 }
 
-fn warnings(out: &mut String, warnings: &[Warning]) {
+/// What was noticed, as a list.
+pub(crate) fn warnings(out: &mut String, warnings: &[Warning]) {
     if warnings.is_empty() {
         return;
     }

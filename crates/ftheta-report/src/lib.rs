@@ -1,8 +1,10 @@
 //! What the beam did against what was asked: figures, picture and report.
 
 pub mod calibration_report;
+pub mod delay_report;
 pub mod jump_report;
 pub mod pattern_report;
+pub mod picture_view;
 pub mod plate;
 pub mod report;
 pub mod score;
@@ -22,6 +24,7 @@ mod light_view;
 mod line_dose;
 mod plot;
 mod progress;
+mod scatter;
 mod segment_tree;
 mod tally;
 mod text;

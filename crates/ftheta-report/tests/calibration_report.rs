@@ -52,6 +52,7 @@ fn page(points: &[ReportPoint], errors_um: &[f64]) -> String {
         ],
         advice: &["measure 81 points: 5 µm rms are to be expected".into()],
         warnings: &[Warning::new("m.csv:8", "does not fit the others <by 1.2 mm>")],
+        pictures: &[],
     })
 }
 

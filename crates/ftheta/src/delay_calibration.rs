@@ -1,12 +1,16 @@
 //! Delays from a picture, as settings of a controller and as a machine file.
 
+use crate::report_picture::Part;
 use ftheta_calibrate::delay::error::DelayError;
-use ftheta_calibrate::delay::{Delays, Method, estimate};
+use ftheta_calibrate::delay::growth::Growth;
+use ftheta_calibrate::delay::{Delays, LineEndSeen, Method, estimate};
 use ftheta_formats::picture_file::PictureRead;
 use ftheta_model::machine::Machine;
 use ftheta_model::pattern::{LaserDelays, Pattern};
-use ftheta_model::picture::Picture;
+use ftheta_model::picture::{Picture, PixelPoint};
 use ftheta_model::warning::Warning;
+use ftheta_report::delay_report::{DelayReportInput, SpeedRow, delay_report_html};
+use ftheta_report::picture_view::{Sight, SightKind};
 
 pub use ftheta_calibrate::delay::DelayOptions;
 
@@ -16,6 +20,10 @@ const SETTLED_US: f64 = 1.0;
 const LONG_US: f64 = 150.0;
 /// A delay of this deviation is worth a better picture, µs.
 const UNSURE_US: f64 = 1.0;
+/// Side of an enlarged part, px.
+const PART_PX: f64 = 160.0;
+/// What the ends of a line are called.
+const ENDS: [&str; 2] = ["start", "stop"];
 /// Share of the line ends that may be left out without a word.
 const LEFT_OUT_SHARE: f64 = 0.05;
 
@@ -73,8 +81,58 @@ pub fn calibrate_delay(
 
 impl DelayCalibration {
     /// The page that shows it.
-    pub fn report(&self, _picture: &Picture, _pattern: &Pattern, _machine: &str) -> String {
-        String::new()
+    ///
+    /// * `picture`: the one that was measured
+    pub fn report(&self, picture: &Picture, machine: &str) -> String {
+        let delays = &self.delays;
+        let us = |s: f64| s * 1e6;
+        let mean_us = 0.5 * us(delays.tau_on_s + delays.tau_off_s);
+        let [on_sd, off_sd, mean_sd] = delays.sd_s.map(us);
+        let late_us =
+            [(us(delays.tau_on_s), on_sd), (us(delays.tau_off_s), off_sd), (mean_us, mean_sd)];
+        let sights = self.sights();
+        let parts = parts(delays, picture);
+        let views: Vec<_> = parts.iter().map(|part| part.view(&sights)).collect();
+        let comb = delays.method == Method::Comb;
+        delay_report_html(&DelayReportInput {
+            machine,
+            method: if comb { "comb" } else { "rectangle" },
+            late_us,
+            set_us: [self.set.on_us, self.set.off_us],
+            settings_us: [self.settings.on_us, self.settings.off_us],
+            patent_us: delays.patent_s.map(|both| both.map(us)),
+            speeds: &speed_rows(delays),
+            residuals: &residuals(delays),
+            rms_um: comb.then_some(delays.rms_mm * 1e3),
+            rejects: &self.rejects(),
+            n_ends: 2 * delays.lines.len(),
+            facts: &facts(delays),
+            views: &views,
+            advice: &self.advice,
+            warnings: &self.warnings,
+        })
+    }
+
+    /// Line, end and reason of all ends that were left out.
+    pub fn rejects(&self) -> Vec<(String, &'static str, &'static str)> {
+        let lines = self.delays.lines.iter();
+        let ends = lines.flat_map(|line| line.ends.iter().zip(ENDS).map(move |end| (line, end)));
+        ends.filter_map(|(line, (end, which))| Some((line.id.clone(), which, end.reject?.reason())))
+            .collect()
+    }
+
+    /// Every end that was seen.
+    fn sights(&self) -> Vec<Sight> {
+        let lines = self.delays.lines.iter();
+        let ends = lines.flat_map(|line| line.ends.iter().zip(ENDS).map(move |end| (line, end)));
+        ends.filter_map(|(line, (end, which))| {
+            let left = end.left_mm.map_or(String::new(), |mm| format!(", {:.1} µm off", mm * 1e3));
+            let why = end.reject.map_or(left, |reject| format!(": {}", reject.reason()));
+            let label = format!("{which} of {} at {} mm/s{why}", line.id, line.speed_mm_s);
+            let kind = if end.reject.is_some() { SightKind::LeftOut } else { SightKind::Used };
+            Some(Sight { kind, places: vec![end.pixel?], label })
+        })
+        .collect()
     }
 
     /// The machine with these delays, and what of them stays, µs on and off.
@@ -100,6 +158,81 @@ impl DelayCalibration {
         let left = |index: usize| (wanted_ns[index] - now_ns[index]) as f64 * 1e-3;
         (applied, LaserDelays { on_us: left(0), off_us: left(1) })
     }
+}
+
+/// The whole picture, and parts of it about a start and a stop.
+fn parts(delays: &Delays, picture: &Picture) -> Vec<Part> {
+    let around = |caption: &str, which: usize| {
+        let seen: Vec<PixelPoint> =
+            delays.lines.iter().filter_map(|line| line.ends[which].pixel).collect();
+        let middle = seen.get(seen.len() / 2)?;
+        let corner = [middle.x_px, middle.y_px].map(|px| (px - 0.5 * PART_PX).max(0.0) as usize);
+        let side = PART_PX as usize;
+        Part::enlarged(caption, picture, [corner[0], corner[1], side, side])
+    };
+    let whole = Part::whole("the whole picture", picture);
+    let start = around("a part of it about a start, enlarged", 0);
+    let stop = around("a part of it about a stop, enlarged", 1);
+    [whole, start, stop].into_iter().flatten().collect()
+}
+
+fn residuals(delays: &Delays) -> Vec<(f64, f64, bool)> {
+    let lines = delays.lines.iter();
+    let ends = lines.flat_map(|line| {
+        line.ends.iter().zip([true, false]).map(move |end| (line.speed_mm_s, end))
+    });
+    ends.filter(|(_, (end, _))| end.reject.is_none())
+        .filter_map(|(speed, (end, start))| Some((speed, end.left_mm? * 1e3, start)))
+        .collect()
+}
+
+/// Ends by speed: the mean of both ways, in which the pattern's place does not count.
+fn speed_rows(delays: &Delays) -> Vec<SpeedRow> {
+    let growth_mm = |index: usize| match &delays.growth {
+        Growth::Modelled { growth_mm, .. } => growth_mm.get(index).copied().unwrap_or(f64::NAN),
+        Growth::Alike => delays.growth_mm,
+    };
+    let mut speeds: Vec<f64> = delays.lines.iter().map(|line| line.speed_mm_s).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    let row = |(index, &speed_mm_s): (usize, &f64)| {
+        let mean = |which: usize, of: fn(&LineEndSeen) -> Option<f64>| {
+            let way = |forth: bool| {
+                let lines = delays.lines.iter();
+                let lines = lines.filter(|l| l.speed_mm_s == speed_mm_s && l.forth == forth);
+                let ends = lines.map(|line| &line.ends[which]).filter(|end| end.reject.is_none());
+                let values: Vec<f64> = ends.filter_map(of).collect();
+                values.iter().sum::<f64>() / values.len() as f64
+            };
+            0.5e3 * (way(true) + way(false))
+        };
+        let off_um = [0, 1].map(|which| mean(which, |end| end.off_mm));
+        let fitted_um = [0, 1].map(|which| mean(which, |end| Some(end.off_mm? - end.left_mm?)));
+        SpeedRow {
+            speed_mm_s,
+            off_um,
+            fitted_um,
+            width_um: delays.widths.get(index).map_or(f64::NAN, |width| width.width_mm * 1e3),
+            growth_um: growth_mm(index) * 1e3,
+        }
+    };
+    speeds.iter().enumerate().map(row).collect()
+}
+
+fn facts(delays: &Delays) -> Vec<(&'static str, String)> {
+    let scene = &delays.scene;
+    let mut facts = vec![
+        ("Lines", delays.lines.len().to_string()),
+        ("Scale", format!("{:.2} µm/px", scene.mm_per_px * 1e3)),
+        ("Blur", format!("{:.2} px", scene.blur_px)),
+        ("Contrast", format!("{:.0} %", scene.contrast * 100.0)),
+        ("Noise", format!("{:.1} %", scene.noise * 100.0)),
+        ("Rows off the view", format!("{:.3} px rms", scene.view_rms_px)),
+    ];
+    if let Some(acceleration) = delays.acceleration_mm_s2 {
+        facts.push(("Acceleration at starts", format!("{:.0} m/s²", acceleration * 1e-3)));
+    }
+    facts
 }
 
 fn warnings(delays: &Delays, pattern: &Pattern) -> Vec<Warning> {
@@ -187,9 +320,7 @@ fn advice(delays: &Delays, machine: &Machine) -> Vec<String> {
 /// Growth of the ends that was reckoned with, µm.
 fn growth_um(delays: &Delays) -> f64 {
     match &delays.growth {
-        ftheta_calibrate::delay::growth::Growth::Modelled { growth_mm, .. } => {
-            growth_mm.first().map_or(0.0, |mm| mm * 1e3)
-        }
+        Growth::Modelled { growth_mm, .. } => growth_mm.first().map_or(0.0, |mm| mm * 1e3),
         _ => 0.0,
     }
 }

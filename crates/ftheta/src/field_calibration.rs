@@ -3,6 +3,7 @@
 
 use crate::Error;
 use crate::field::corrected;
+use crate::field_picture::FieldPicture;
 use ftheta_calibrate::accuracy::{Spread, distance_mm};
 use ftheta_calibrate::calibrate::{CalibrateOptions, Calibration, Model, calibrate};
 use ftheta_calibrate::error::CalibrateError;
@@ -255,7 +256,9 @@ fn advice(calibration: &Calibration, marks: &[Mark]) -> Vec<String> {
 
 impl FieldCalibration {
     /// The page that shows it.
-    pub fn report(&self, machine: &str) -> String {
+    ///
+    /// * `pictures`: those that points were measured in
+    pub fn report(&self, machine: &str, pictures: &[FieldPicture]) -> String {
         let calibration = &self.calibration;
         let um =
             |spread: Spread| ErrorSummary { rms: spread.rms_mm * 1e3, max: spread.max_mm * 1e3 };
@@ -281,6 +284,11 @@ impl FieldCalibration {
             _ => coefficients.collect(),
         };
         let axes = &calibration.axes;
+        let parts: Vec<_> = pictures
+            .iter()
+            .filter_map(|picture| Some((picture.part()?, picture.sights())))
+            .collect();
+        let views: Vec<_> = parts.iter().map(|(part, sights)| part.view(sights)).collect();
         calibration_report_html(&CalibrationReportInput {
             machine,
             model: calibration.model.name(),
@@ -298,6 +306,7 @@ impl FieldCalibration {
             parameters: &parameters,
             advice: &self.advice,
             warnings: &calibration.warnings,
+            pictures: &views,
         })
     }
 

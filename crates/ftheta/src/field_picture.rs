@@ -1,5 +1,6 @@
 //! Measured points from pictures of a marked grid, instead of a ruler.
 
+use crate::report_picture::Part;
 use crate::{Error, camera, import};
 use ftheta_calibrate::picture::error::PictureError;
 use ftheta_calibrate::picture::{FieldSeen, PictureOptions, find_field};
@@ -9,6 +10,7 @@ use ftheta_model::pattern::Pattern;
 use ftheta_model::picture::Picture;
 use ftheta_model::space::FieldPoint;
 use ftheta_model::warning::Warning;
+use ftheta_report::picture_view::{Sight, SightKind};
 use std::path::PathBuf;
 
 /// Where a picture comes from.
@@ -52,6 +54,43 @@ pub struct FieldPicture {
     pub seen: FieldSeen,
     /// What was noticed.
     pub warnings: Vec<Warning>,
+}
+
+impl FieldPicture {
+    /// The picture for a report.
+    pub(crate) fn part(&self) -> Option<Part> {
+        let seen = &self.seen;
+        let n_found = seen.marks.iter().filter(|mark| mark.pixel.is_some()).count();
+        let caption = format!(
+            "{}: {n_found} of {} marks, {:.1} µm/px",
+            self.path.display(),
+            seen.marks.len(),
+            seen.mm_per_px * 1e3
+        );
+        Part::whole(&caption, &self.picture)
+    }
+
+    /// What was found in it: marks, signs, where marks are missing, and what is none.
+    pub(crate) fn sights(&self) -> Vec<Sight> {
+        let seen = &self.seen;
+        let sight = |kind, places, label: String| Sight { kind, places, label };
+        let marks = seen.marks.iter().filter_map(|mark| match mark.pixel {
+            Some(pixel) => Some(sight(SightKind::Used, vec![pixel], mark.id.clone())),
+            None => {
+                let expected = seen.view?.pixel(mark.target_mm)?;
+                let label = format!("{} was not found about here", mark.id);
+                Some(sight(SightKind::LeftOut, vec![expected], label))
+            }
+        });
+        let signs = seen.signs.iter().map(|sign| {
+            let kind = if sign.kept { SightKind::Used } else { SightKind::LeftOut };
+            sight(kind, sign.corners.to_vec(), format!("sign {}", sign.number))
+        });
+        let extra = seen.extra.iter().map(|pixel| {
+            sight(SightKind::Extra, vec![*pixel], "looks like a mark, and is not in line".into())
+        });
+        marks.chain(signs).chain(extra).collect()
+    }
 }
 
 /// Finds the marks of a pattern in a picture.

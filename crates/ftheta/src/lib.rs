@@ -28,6 +28,7 @@ pub mod photograph;
 mod planning;
 pub mod promise;
 pub mod rehearsal;
+mod report_picture;
 pub mod results;
 pub mod tables;
 pub mod verify;

@@ -62,7 +62,7 @@ fn run_field(arguments: &CalibrateField, as_json: bool) -> Result<(), Error> {
     warnings.extend(field.calibration.warnings.iter().cloned());
     tables::write(&field.table, &machine, &arguments.out, CorVersion::Two)?;
     let report = arguments.out.with_file_name("calibration.html");
-    write_file(&report, field.report(&machine.name).as_bytes())?;
+    write_file(&report, field.report(&machine.name, &pictures).as_bytes())?;
     let mut files = vec![
         ("table", arguments.out.display().to_string()),
         ("report", report.display().to_string()),

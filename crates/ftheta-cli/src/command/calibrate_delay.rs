@@ -6,14 +6,15 @@ use crate::screen::{note, say};
 use ftheta::calibrate::delay::Method;
 use ftheta::calibrate::delay::growth::Growth;
 use ftheta::delay_calibration::{DelayCalibration, calibrate_delay};
+use ftheta::field_picture::Source;
 use ftheta::formats::machine::to_toml;
 use ftheta::model::machine::Machine;
 use ftheta::model::pattern::{LaserDelays, Pattern};
 use ftheta::model::warning::Warning;
 use ftheta::output::write_file;
-use ftheta::{Error, camera, import, machines};
+use ftheta::{Error, import, machines};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The machine where none is known.
 const GUESSED: &str = "S10";
@@ -22,16 +23,13 @@ const GUESSED: &str = "S10";
 pub fn run(arguments: &CalibrateDelay, as_json: bool) -> Result<(), Error> {
     let pattern = import::pattern(&arguments.pattern)?;
     let (machine, guessed) = machine(arguments, &pattern)?;
-    let (source, picture) = match (&arguments.camera, &arguments.image) {
-        (Some(device), _) => (PathBuf::from(device), camera::take(device)?),
-        (None, image) => {
-            let path = image.clone().unwrap_or_default();
-            let picture = import::picture(&path)?;
-            (path, picture)
-        }
+    let source = match (&arguments.camera, &arguments.image) {
+        (Some(device), _) => Source::Device(device.clone()),
+        (None, image) => Source::File(image.clone().unwrap_or_default()),
     };
+    let picture = source.read()?;
     let mut found = calibrate_delay(&picture, &pattern, &machine, arguments.method.map(Into::into))
-        .map_err(|error| Error::Delay { path: source.clone(), source: error })?;
+        .map_err(|error| Error::Delay { path: source.path(), source: error })?;
     if guessed {
         let text = format!("the pattern names no machine that is known here: {GUESSED} is taken");
         found.warnings.push(Warning::new("machine", text));
@@ -44,7 +42,7 @@ pub fn run(arguments: &CalibrateDelay, as_json: bool) -> Result<(), Error> {
         write_file(out, to_toml(&applied).as_bytes())?;
         files.push(("machine", out.display().to_string()));
     }
-    let page = found.report(&picture.picture, &pattern, &machine.name);
+    let page = found.report(&picture.picture, &machine.name);
     write_file(&report, page.as_bytes())?;
     files.push(("report", report.display().to_string()));
     match as_json {
@@ -75,15 +73,9 @@ fn object(
     let delays = &found.delays;
     let [on_sd, off_sd, mean_sd] = delays.sd_s.map(|s| s * 1e6);
     let scene = &delays.scene;
-    let rejected: Vec<Value> = delays
-        .lines
-        .iter()
-        .flat_map(|line| line.ends.iter().zip(["start", "stop"]).map(move |end| (line, end)))
-        .filter_map(|(line, (end, which))| {
-            let why = end.reject?.reason();
-            Some(json!({"id": line.id, "end": which, "why": why}))
-        })
-        .collect();
+    let rejected = found.rejects().into_iter();
+    let rejected: Vec<Value> =
+        rejected.map(|(id, end, why)| json!({"id": id, "end": end, "why": why})).collect();
     json!({
         "machine": machine,
         "method": if delays.method == Method::Comb { "comb" } else { "rectangle" },
@@ -140,8 +132,7 @@ fn print(found: &DelayCalibration, left: LaserDelays, files: &[(&str, String)]) 
     if left.on_us.abs().max(left.off_us.abs()) > 1e-3 {
         say!("left     on {:.2} µs, off {:.2} µs with --apply mirrors", left.on_us, left.off_us);
     }
-    let ends = delays.lines.iter().flat_map(|line| line.ends);
-    let n_rejected = ends.filter(|end| end.reject.is_some()).count();
+    let n_rejected = found.rejects().len();
     say!(
         "lines    {} at {:.1} µm/px, {n_rejected} ends left out, {:.1} µm rms",
         delays.lines.len(),
