@@ -39,6 +39,8 @@ const PRINT_PERCENT: f64 = 3.0;
 const MARKS_SHARE: f64 = 0.7;
 /// Smallest mark, px.
 const SIZE_MIN_PX: f64 = 10.0;
+/// Two marks nearer than this, by half of one, are the same.
+const SAME: f64 = 0.5;
 /// Marks beside the grid, by its own, that are another grid.
 const BESIDE_SHARE: f64 = 0.2;
 const N_BESIDE: usize = 8;
@@ -339,15 +341,18 @@ fn indexed(
 ) -> Result<Found, PictureError> {
     let ground = Ground { off: &flat.off, width: picture.width(), noise: flat.noise_left };
     let (bright, list) = candidates::candidates(&ground, looks.shape, grid.n_marks());
-    // Twice as many as there can be is enough, and bounds the work on gravel.
-    let marks: Vec<PixelPoint> = list
-        .iter()
-        .take(4 * grid.n_marks() + 100)
-        .filter_map(|candidate| {
-            let shape = (looks.shape)(candidate.pixel)?;
-            centre::centre(picture, bright, &shape, candidate.pixel)
-        })
-        .collect();
+    // Some times as many as there can be is enough, and bounds the work on gravel.
+    let most = 4 * grid.n_marks() + 100;
+    let mut marks: Vec<PixelPoint> = Vec::new();
+    for candidate in list.iter().take(most) {
+        let Some(shape) = (looks.shape)(candidate.pixel) else { continue };
+        let centre = centre::centre(picture, bright, &shape, candidate.pixel);
+        // Two candidates may lead to the same mark.
+        let limit_px = SAME * shape.reach_px();
+        let new = |centre: &PixelPoint| marks.iter().all(|mark| mark.distance(*centre) > limit_px);
+        let centre = centre.filter(new);
+        marks.extend(centre);
+    }
     let mut all = lattice::lattices(&marks, looks.ways).into_iter();
     let mut lattice = all.next().unwrap_or_default();
     lattice::trim(&mut lattice, grid.size());

@@ -6,8 +6,8 @@ use crate::raster::pieces::{Piece, pieces_with_runs};
 use ftheta_model::pattern::MarkStyle;
 use ftheta_model::picture::PixelPoint;
 
-/// A piece differs from its surroundings by this part of the contrast.
-const THRESHOLD: f64 = 0.35;
+/// A piece differs from its surroundings by such a part of the contrast.
+const THRESHOLDS: [f64; 3] = [0.35, 0.2, 0.12];
 /// Smallest side of the box around a mark, px.
 const BOX_MIN_PX: usize = 7;
 /// Sides of that box differ by this factor at most.
@@ -36,25 +36,37 @@ pub struct Guess {
 pub fn guess(flat: &Flat, width: usize, style: MarkStyle) -> Option<Guess> {
     let [low, high] = flat.extremes;
     let contrast = high.max(-low);
-    let threshold = (THRESHOLD * contrast).max(4.0 * flat.noise_left) as f32;
     let dark: Vec<f32> = flat.off.iter().map(|value| -value).collect();
-    let of = |values: &[f32]| {
-        let all = pieces_with_runs(values, width, threshold);
-        all.iter().filter_map(|(piece, runs)| mark(piece, runs, style)).collect::<Vec<_>>()
-    };
-    let (dark, bright) = (of(&dark), of(&flat.off));
-    let mut marks = if bright.len() > dark.len() { bright } else { dark };
+    let mut marks: Vec<(PixelPoint, f64)> = Vec::new();
+    // Beside black print what is burned differs little.
+    for share in THRESHOLDS {
+        let threshold = (share * contrast).max(4.0 * flat.noise_left) as f32;
+        for values in [&dark, &flat.off] {
+            let all = pieces_with_runs(values, width, threshold);
+            let found = all.iter().filter_map(|(piece, runs)| mark(piece, runs, style));
+            let found = alike(found.collect());
+            if found.len() > marks.len() {
+                marks = found;
+            }
+        }
+    }
     if marks.len() < N_MIN {
         return None;
     }
-    marks.sort_by(|a, b| a.1.total_cmp(&b.1));
     let usual = marks[marks.len() / 2].1;
-    marks.retain(|(_, size)| (size / usual - 1.0).abs() < SIZE);
     let (pitch_px, direction) = neighbours(&marks)?;
     let (sin, cos) = direction.sin_cos();
     let axes = |length: f64| [[length * cos, length * sin], [length * sin, -length * cos]];
     let shape = Shape { style, arms_px: axes(0.5 * usual) };
     Some(Guess { shape, ways_px: axes(pitch_px) })
+}
+
+/// Those of about the usual size, the smallest first.
+fn alike(mut marks: Vec<(PixelPoint, f64)>) -> Vec<(PixelPoint, f64)> {
+    marks.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let usual = marks.get(marks.len() / 2).map_or(0.0, |mark| mark.1);
+    marks.retain(|(_, size)| (size / usual - 1.0).abs() < SIZE);
+    marks
 }
 
 /// The middle and size of a piece that looks like a mark.
