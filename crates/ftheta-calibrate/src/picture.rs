@@ -3,6 +3,7 @@
 //! [`find_field`] is the entry. What tells lengths is a printed sheet with signs around the grid, a
 //! scanner's scale, or a camera whose view of the plane is known.
 
+pub mod camera;
 mod candidates;
 mod centre;
 pub mod error;
@@ -10,8 +11,8 @@ mod grid;
 mod guess;
 mod lattice;
 mod quad;
-pub mod signs;
-pub mod view_fit;
+mod signs;
+mod view_fit;
 
 use crate::raster::flat::Flat;
 use candidates::{Ground, Shape};
@@ -31,8 +32,9 @@ const N_SIGNS_MIN: usize = 4;
 const SIGNS_SHARE: f64 = 0.5;
 /// With a lens that is not known there have to be more.
 const N_SIGNS_FREE: usize = 8;
-/// Signs are no farther off the fitted view than this, px rms.
+/// Signs are no farther off the fitted view than this, px rms, or as far as printers are off, mm.
 const BENT_PX: f64 = 0.6;
+const BENT_MM: f64 = 0.04;
 /// Printers are no farther off than this, percent.
 const PRINT_PERCENT: f64 = 3.0;
 /// Share of the marks that has to be found.
@@ -208,27 +210,15 @@ fn ruler(
     if let Some(mm_per_px) = options.mm_per_px {
         return Ok(Ruler::Scale(mm_per_px));
     }
-    let fiducials = fiducials(pattern);
-    if fiducials.is_empty() {
-        return Err(PictureError::NoScale);
-    }
-    let scale = sheet_scale(pattern, options.sheet_mm)?;
-    let found = find_signs(picture, flat);
-    let sightings = sign_sightings(&found, &fiducials, scale)?;
+    let SignsFound { found, sightings, limit } = signs_of(picture, flat, pattern, options)?;
     let size_px = [picture.width(), picture.height()];
-    let n_least = if options.lens.is_some() { N_SIGNS_MIN } else { N_SIGNS_FREE };
-    let limit = n_least.max((SIGNS_SHARE * fiducials.len() as f64) as usize);
-    let few =
-        |n_found: usize| Err(PictureError::FewSigns { n_found, n_signs: fiducials.len(), limit });
-    if sightings.len() < limit {
-        return few(sightings.len());
-    }
-    let Some(fitted) = fit_view(&sightings, size_px, options.lens) else {
-        return few(sightings.len());
-    };
+    let n_signs = fiducials(pattern).len();
+    let few = PictureError::FewSigns { n_found: sightings.len(), n_signs, limit };
+    let fitted = fit_view(&sightings, size_px, options.lens).ok_or(few)?;
     let n_kept = fitted.kept.iter().filter(|kept| **kept).count();
-    if n_kept < limit || fitted.rms_px > BENT_PX {
-        return Err(PictureError::Bent { rms_px: fitted.rms_px, limit_px: BENT_PX });
+    let limit_px = BENT_PX.max(BENT_MM * px_per_mm(&fitted.view));
+    if n_kept < limit || fitted.rms_px > limit_px {
+        return Err(PictureError::Bent { rms_px: fitted.rms_px, limit_px });
     }
     let signs = found.iter().zip(&fitted.kept).map(|(sign, &kept)| SignSeen {
         number: sign.number,
@@ -239,8 +229,60 @@ fn ruler(
     Ok(Ruler::View { view: fitted.view, seen: fitted.seen, rms_px: fitted.rms_px, signs })
 }
 
+/// Signs in a picture, where their corners are on the sheet, and how many are enough.
+struct SignsFound {
+    found: Vec<Sign>,
+    sightings: Vec<Vec<Sighting>>,
+    limit: usize,
+}
+
+fn signs_of(
+    picture: &Picture,
+    flat: &Flat,
+    pattern: &Pattern,
+    options: &PictureOptions,
+) -> Result<SignsFound, PictureError> {
+    let fiducials = fiducials(pattern);
+    if fiducials.is_empty() {
+        return Err(PictureError::NoScale);
+    }
+    let scale = sheet_scale(pattern, options.sheet_mm)?;
+    let found = find_signs(picture, flat);
+    let sightings = sign_sightings(&found, &fiducials, scale)?;
+    let n_least = if options.lens.is_some() { N_SIGNS_MIN } else { N_SIGNS_FREE };
+    let limit = n_least.max((SIGNS_SHARE * fiducials.len() as f64) as usize);
+    if sightings.len() < limit {
+        let (n_found, n_signs) = (sightings.len(), fiducials.len());
+        return Err(PictureError::FewSigns { n_found, n_signs, limit });
+    }
+    Ok(SignsFound { found, sightings, limit })
+}
+
+/// Corners of a sheet's signs in a picture, sign by sign.
+///
+/// * `sheet_mm`: what the sheet's printed lines along x and y measure, mm
+///
+/// # Errors
+/// If there are too few signs, or they are not the sheet's.
+pub fn sheet_sightings(
+    picture: &Picture,
+    pattern: &Pattern,
+    sheet_mm: [Option<f64>; 2],
+) -> Result<Vec<Vec<Sighting>>, PictureError> {
+    let flat = Flat::new(picture);
+    contrast(&flat)?;
+    let options = PictureOptions { sheet_mm, ..PictureOptions::default() };
+    Ok(signs_of(picture, &flat, pattern, &options)?.sightings)
+}
+
+/// Scale in the middle of the plane.
+fn px_per_mm(view: &View) -> f64 {
+    let at = |x: f64| view.pixel(FieldPoint::new(x, 0.0));
+    at(0.0).zip(at(1.0)).map_or(0.0, |(a, b)| a.distance(b))
+}
+
 /// Printed signs of a pattern: number, centre and side, mm.
-pub fn fiducials(pattern: &Pattern) -> Vec<(usize, FieldPoint, f64)> {
+fn fiducials(pattern: &Pattern) -> Vec<(usize, FieldPoint, f64)> {
     let printed = pattern.features.iter().filter_map(|feature| match &feature.shape {
         FeatureShape::Fiducial { family, code, place_mm, size_mm, burned: false }
             if family == tag::FAMILY =>
@@ -256,7 +298,7 @@ pub fn fiducials(pattern: &Pattern) -> Vec<(usize, FieldPoint, f64)> {
 ///
 /// # Errors
 /// If a sign is not the sheet's, there twice, or mirrored.
-pub fn sign_sightings(
+fn sign_sightings(
     found: &[Sign],
     fiducials: &[(usize, FieldPoint, f64)],
     scale: [f64; 2],
@@ -288,10 +330,7 @@ pub fn sign_sightings(
 ///
 /// # Errors
 /// If a line that is there was not measured, or cannot have this length.
-pub fn sheet_scale(
-    pattern: &Pattern,
-    sheet_mm: [Option<f64>; 2],
-) -> Result<[f64; 2], PictureError> {
+fn sheet_scale(pattern: &Pattern, sheet_mm: [Option<f64>; 2]) -> Result<[f64; 2], PictureError> {
     let mut scale = [1.0; 2];
     for (index, axis) in ['x', 'y'].into_iter().enumerate() {
         let Some(nominal_mm) = printed_line_mm(pattern, index) else { continue };
@@ -308,7 +347,7 @@ pub fn sheet_scale(
 }
 
 /// Length of the longest printed reference line along x (0) or y (1), mm.
-pub fn printed_line_mm(pattern: &Pattern, axis: usize) -> Option<f64> {
+fn printed_line_mm(pattern: &Pattern, axis: usize) -> Option<f64> {
     let lines = pattern.features.iter().filter_map(|feature| match &feature.shape {
         FeatureShape::Reference { from_mm, to_mm, burned: false } => {
             let (dx, dy) = (to_mm.x_mm - from_mm.x_mm, to_mm.y_mm - from_mm.y_mm);

@@ -1,6 +1,7 @@
 //! The commands: each reads its arguments, calls the library, prints.
 
 pub mod calibrate;
+pub mod calibrate_camera;
 pub mod calibrate_delay;
 pub mod circle;
 pub mod convert;

@@ -1,6 +1,7 @@
 //! Everything that can go wrong between a file and a marked field.
 
 use crate::camera::CameraError;
+use crate::camera_calibration::CameraCalibrationError;
 use crate::exchange::ExchangeError;
 use crate::field::FieldError;
 use crate::pattern::error::PatternError;
@@ -146,6 +147,9 @@ pub enum Error {
         /// What is wrong in it.
         source: CameraFileError,
     },
+    /// Pictures give no camera.
+    #[error(transparent)]
+    CameraCalibration(#[from] CameraCalibrationError),
     /// A picture gives no field.
     #[error("{path}: {source}", path = path.display())]
     Picture {
@@ -290,6 +294,7 @@ impl Error {
                 (format!("{}: {place}", path.display()), value, limit)
             }
             Self::CameraFile { path, source } => in_file(path, source.fault()),
+            Self::CameraCalibration(error) => error.fault(),
             Self::Picture { path, source } => in_file(path, source.fault()),
             Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
             Self::Units { path } => {

@@ -6,6 +6,7 @@
 pub mod against;
 pub mod atlas_store;
 pub mod camera;
+pub mod camera_calibration;
 pub mod circle;
 pub mod convert;
 pub mod delay_calibration;

@@ -9,11 +9,13 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 const SCALE_MM: f64 = 100.0;
 /// What a sighting is off, px rms: what priors are weighed against. Printed signs are off as a
 /// whole, so the four corners of one say no more than one of them would.
-const SIGHTING_PX: f64 = 0.3;
+pub const SIGHTING_PX: f64 = 0.2;
 /// What lenses are like, as priors: radial, tangential, centre off the middle by the focal length.
-const RADIAL: f64 = 0.2;
-const TANGENTIAL: f64 = 0.0005;
-const CENTRE: f64 = 0.005;
+pub const RADIAL: f64 = 0.2;
+/// See there.
+pub const TANGENTIAL: f64 = 0.001;
+/// See there.
+pub const CENTRE: f64 = 0.01;
 /// With fewer sightings a lens' higher terms are left alone.
 const N_FREE: usize = 48;
 /// A group is left out if it is so many times as far off as the usual one, and by this much, px.
@@ -202,7 +204,7 @@ mod tests {
             let place = FieldPoint::new(place.0, place.1);
             let back = found.seen.place(view.pixel(place).unwrap()).unwrap();
             let off = (back.x_mm - place.x_mm).hypot(back.y_mm - place.y_mm);
-            assert!(off < 2e-3, "{place:?} {off}");
+            assert!(off < 4e-3, "{place:?} {off}");
         }
         let known = fit_view(&groups[..6], [4000, 3000], Some(view.lens)).unwrap();
         assert!(known.rms_px < 1e-6, "{}", known.rms_px);

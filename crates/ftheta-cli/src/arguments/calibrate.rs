@@ -21,6 +21,8 @@ pub enum CalibrateAction {
     Field(CalibrateField),
     /// The laser's delays from a picture of the delay pattern.
     Delay(CalibrateDelay),
+    /// A camera's lens from pictures of a printed sheet.
+    Camera(CalibrateCamera),
     /// Follow what has moved since a table was made, by gain and offset from a few marks.
     Drift(CalibrateDrift),
 }
@@ -101,6 +103,36 @@ pub struct PictureArguments {
     /// Table of the measured marks to write.
     #[arg(long, value_name = "CSV")]
     pub points_out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  ftheta calibrate camera --pattern grid.json --image a.jpg --image b.jpg --image c.jpg \\
+      --sheet-x-mm 260.6 --sheet-y-mm 259.3 --out camera.json
+
+Take the sheet of `ftheta pattern grid --fiducials` from above and tilted by 20 to 40° to several
+sides, with the zoom and focus that the field will be photographed with. A camera that stands still
+takes the field's plane first, and --keep-view keeps how it sees it: then a plate needs no sheet.")]
+pub struct CalibrateCamera {
+    /// The pattern's .json, whose sheet the pictures show.
+    #[arg(long, value_name = "JSON")]
+    pub pattern: PathBuf,
+    /// A picture of the sheet; three and more.
+    #[arg(long, value_name = "PICTURE", required = true)]
+    pub image: Vec<PathBuf>,
+    /// What the printed sheet's line along x measures, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sheet_x_mm: Option<f64>,
+    /// What the printed sheet's line along y measures, mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sheet_y_mm: Option<f64>,
+    /// Also keep how the first picture's plane was seen.
+    #[arg(long)]
+    pub keep_view: bool,
+    /// Camera file to write.
+    #[arg(long, value_name = "JSON")]
+    pub out: PathBuf,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -3,7 +3,7 @@
 use crate::arguments::calibrate::{
     Calibrate, CalibrateAction, CalibrateDrift, CalibrateField, Twin, TwinAction, TwinMeasure,
 };
-use crate::command::{calibrate_delay, field_picture};
+use crate::command::{calibrate_camera, calibrate_delay, field_picture};
 use crate::json;
 use crate::progress::Progress;
 use crate::screen::{note, say};
@@ -31,6 +31,7 @@ pub fn run(arguments: &Calibrate, as_json: bool) -> Result<(), Error> {
     match &arguments.action {
         CalibrateAction::Field(field) => run_field(field, as_json),
         CalibrateAction::Delay(delay) => calibrate_delay::run(delay, as_json),
+        CalibrateAction::Camera(camera) => calibrate_camera::run(camera, as_json),
         CalibrateAction::Drift(drift) => run_drift(drift, as_json),
     }
 }
