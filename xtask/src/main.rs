@@ -12,7 +12,7 @@ cargo xtask COMMAND
   ci       everything that CI runs: format, clippy, tidy, licences, docs, test
   test     all tests, the examples and the main job
   tidy     layers, sizes, descriptions, words
-  figures  the benches, printed as a table, calibrations, and a million transitions";
+  figures  the benches, printed as a table, calibrations, pictures, and a million transitions";
 
 fn main() -> ExitCode {
     let command = std::env::args().nth(1).unwrap_or_default();
@@ -46,13 +46,15 @@ fn figures() -> Result<(), String> {
     cargo(&["bench", "--workspace"])?;
     let heads = ["--example", "04_calibration_figures", "20"];
     cargo(&[&["run", "--release", "--package", "ftheta"], &heads[..]].concat())?;
+    let pictures = ["--example", "06_picture_figures", "50"];
+    cargo(&[&["run", "--release", "--package", "ftheta"], &pictures[..]].concat())?;
     cargo(&["run", "--release", "--package", "ftheta-planner", "--example", "transitions"])
 }
 
 fn test() -> Result<(), String> {
     cargo(&["test", "--release", "--workspace", "--all-targets"])?;
     cargo(&["test", "--release", "--workspace", "--doc"])?;
-    for example in ["01_mark_svg", "03_patent_loop"] {
+    for example in ["01_mark_svg", "03_patent_loop", "05_two_photographs"] {
         cargo(&["run", "--release", "--package", "ftheta", "--example", example])?;
     }
     let out = root().join("target/xtask-mark");

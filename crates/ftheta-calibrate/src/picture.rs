@@ -64,6 +64,8 @@ pub struct PictureOptions {
     pub lens: Option<CameraLens>,
     /// The camera's view of the plane, where it stands still.
     pub view: Option<View>,
+    /// Width and height of the pictures that lens or view were made from.
+    pub size_px: Option<[usize; 2]>,
     /// Side of a pixel, mm, of a scanner.
     pub mm_per_px: Option<f64>,
     /// How the field's own place and turn are taken.
@@ -156,6 +158,10 @@ pub fn find_field(
     options: &PictureOptions,
 ) -> Result<FieldSeen, PictureError> {
     let grid = Grid::new(pattern)?;
+    let found = [picture.width(), picture.height()];
+    if let Some(known) = options.size_px.filter(|known| *known != found) {
+        return Err(PictureError::OtherSize { found, known });
+    }
     let flat = Flat::new(picture);
     contrast(&flat)?;
     let ruler = ruler(picture, &flat, pattern, options)?;

@@ -2,103 +2,55 @@
 //! give none.
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
+mod sheet_picture;
+
 use ftheta::calibrate::picture::error::PictureError;
-use ftheta::calibrate::picture::{
-    FieldSeen, MarkSeen, PictureOptions, Placement, find_field, find_marks,
-};
-use ftheta::machines;
-use ftheta::model::machine::Machine;
+use ftheta::calibrate::picture::{FieldSeen, MarkSeen, PictureOptions, find_field, find_marks};
 use ftheta::model::pattern::{FeatureShape, MarkStyle, Pattern};
 use ftheta::model::picture::{Picture, PixelPoint};
-use ftheta::pattern::fiducials;
-use ftheta::pattern::grid::{self, GridOptions};
-use ftheta::pattern::sheet::SheetProcess;
-use ftheta::photograph::{Photograph, PhotographOptions, photograph};
+use ftheta::photograph::{Photograph, PhotographOptions};
+use sheet_picture::{Sheet, tally};
 use std::path::Path;
 
-fn machine() -> Machine {
-    machines::find("S14-f420").unwrap()
-}
-
-/// A grid with its sheet.
-fn pattern(style: MarkStyle, n_side: u32, field_mm: f64) -> Pattern {
-    let process = SheetProcess::of(&machine());
-    let options = GridOptions { n_side, field_mm, style, size_mm: None, process };
-    fiducials::around(grid::sheet(&options, &machine()).unwrap()).unwrap().pattern
-}
-
-/// A photograph of it with dirt, burnt centres and missing marks.
-fn taken(pattern: &Pattern, seed: u64, change: &dyn Fn(&mut PhotographOptions)) -> Photograph {
-    let mut options = PhotographOptions::usual(&machine(), seed);
-    options.burn.missing = 0.03;
-    options.burn.overburn = 3.0;
-    options.sensor.n_dirt = 20;
-    change(&mut options);
-    photograph(pattern, &[], &machine(), &options, &mut |_| {}).unwrap()
-}
-
-fn measured(pattern: &Pattern, photograph: &Photograph) -> Result<FieldSeen, PictureError> {
-    let options = PictureOptions {
-        sheet_mm: photograph.caliper_mm,
-        placement: Placement::Sheet,
-        ..PictureOptions::default()
-    };
-    find_field(&photograph.picture, pattern, &options)
-}
-
 /// All marks that were burned are found, none else, and where they are: in the picture to hundredths
-/// of a pixel, in the field to what the print of signs leaves, mm rms along each axis.
-fn whole(name: &str, seen: &FieldSeen, photograph: &Photograph, [px, mm]: [f64; 2]) {
-    let truth = &photograph.truth.centres;
-    let (mut squares_px, mut squares_mm, mut n) = (0.0, 0.0, 0.0);
-    for mark in &seen.marks {
-        let known = truth.iter().find(|(id, _)| *id == mark.id).map(|(_, place)| place);
-        assert_eq!(known.is_some(), mark.pixel.is_some(), "{name}: {}", mark.id);
-        let (Some(known), Some(pixel), Some(place)) = (known, mark.pixel, mark.measured_mm) else {
-            continue;
-        };
-        let off_px = pixel.distance(known.pixel);
-        // A fibre across a mark is the calibration's to find.
-        squares_px += off_px.min(0.3).powi(2);
-        let off_mm = (place.x_mm - known.place_mm.x_mm).hypot(place.y_mm - known.place_mm.y_mm);
-        squares_mm += off_mm.powi(2);
-        n += 1.0;
-    }
-    let rms = |squares: f64| f64::sqrt(squares / n / 2.0);
-    assert!(rms(squares_px) < px, "{name}: {} px", rms(squares_px));
-    assert!(rms(squares_mm) < mm, "{name}: {} mm", rms(squares_mm));
+/// of a pixel, in the field to what the print of signs leaves, rms along each axis.
+fn whole(name: &str, seen: &FieldSeen, photograph: &Photograph, [px, um]: [f64; 2]) {
+    let tally = tally(seen, photograph);
+    assert_eq!((tally.n_lost, tally.n_false), (0, 0), "{name}: {tally:?}");
+    assert!(tally.off_px < px && tally.off_um < um, "{name}: {tally:?}");
 }
 
 #[test]
 fn every_cross_is_found_and_nothing_else() {
-    let crosses = pattern(MarkStyle::Cross, 17, 240.0);
+    let crosses = Sheet::new(MarkStyle::Cross, 17, 240.0);
     for (name, seed, turn_deg, limits) in
-        [("upright", 201, 0.0, [0.04, 0.02]), ("upside down", 202, 180.0, [0.04, 0.02])]
+        [("upright", 201, 0.0, [0.04, 20.0]), ("upside down", 202, 180.0, [0.04, 20.0])]
     {
-        let photograph = taken(&crosses, seed, &|options| options.camera.turn_deg = turn_deg);
-        let seen = measured(&crosses, &photograph).unwrap();
+        let photograph = crosses.taken(seed, &|options| options.camera.turn_deg = turn_deg);
+        let seen = crosses.seen(&photograph).unwrap();
         assert!(seen.signs.len() > 36, "{name}: {}", seen.signs.len());
         whole(name, &seen, &photograph, limits);
     }
-    let small = pattern(MarkStyle::Cross, 9, 120.0);
-    let rough = taken(&small, 203, &|options| {
+    let small = Sheet::new(MarkStyle::Cross, 9, 120.0);
+    let rough = small.taken(203, &|options| {
         options.sensor.noise = 0.05;
         options.sensor.blur_px = 1.6;
         options.bright = true;
         options.camera.turn_deg = 90.0;
     });
-    whole("rough", &measured(&small, &rough).unwrap(), &rough, [0.12, 0.03]);
-    let dots = pattern(MarkStyle::Dot, 9, 120.0);
-    let photograph = taken(&dots, 204, &|_| {});
-    whole("dots", &measured(&dots, &photograph).unwrap(), &photograph, [0.1, 0.03]);
+    whole("rough", &small.seen(&rough).unwrap(), &rough, [0.12, 30.0]);
+    let dots = Sheet::new(MarkStyle::Dot, 9, 120.0);
+    let photograph = dots.taken(204, &|_| {});
+    whole("dots", &dots.seen(&photograph).unwrap(), &photograph, [0.1, 30.0]);
 }
 
 /// A sheet that lies askew moves and turns what is measured, and not what a field by its marks is.
 #[test]
 fn a_sheet_that_lies_askew_does_not_matter() {
-    let crosses = pattern(MarkStyle::Cross, 9, 120.0);
-    let photograph = taken(&crosses, 205, &|options| options.sheet_lies = [2.0, -1.0, 0.8]);
-    let straight = taken(&crosses, 205, &|_| {});
+    let sheet = Sheet::new(MarkStyle::Cross, 9, 120.0);
+    let crosses = sheet.pattern();
+    let photograph = sheet.taken(205, &|options| options.sheet_lies = [2.0, -1.0, 0.8]);
+    let straight = sheet.taken(205, &|_| {});
     let by_marks = |photograph: &Photograph| {
         let options =
             PictureOptions { sheet_mm: photograph.caliper_mm, ..PictureOptions::default() };
@@ -157,15 +109,15 @@ fn the_reference_crosses_are_found() {
 
 #[test]
 fn pictures_that_show_no_grid_give_no_field() {
-    let crosses = pattern(MarkStyle::Cross, 9, 120.0);
+    let sheet = Sheet::new(MarkStyle::Cross, 9, 120.0);
     let coarse = |options: &mut PhotographOptions| {
         options.camera.megapixels = Some(3.0);
         options.burn.missing = 0.0;
     };
-    let good = taken(&crosses, 211, &coarse);
-    assert!(measured(&crosses, &good).is_ok());
-    let refused = |photograph: &Photograph| measured(&crosses, photograph).unwrap_err();
-    let mirrored = taken(&crosses, 211, &|options| {
+    let good = sheet.taken(211, &coarse);
+    assert!(sheet.seen(&good).is_ok());
+    let refused = |photograph: &Photograph| sheet.seen(photograph).unwrap_err();
+    let mirrored = sheet.taken(211, &|options| {
         coarse(options);
         options.camera.mirrored = true;
     });
@@ -185,7 +137,7 @@ fn pictures_that_show_no_grid_give_no_field() {
         with(Picture::new(2 * width, height, rows.collect()).unwrap())
     };
     assert!(matches!(refused(&twice), PictureError::SignTwice { .. }), "{}", refused(&twice));
-    let white = taken(&crosses, 211, &|options| {
+    let white = sheet.taken(211, &|options| {
         coarse(options);
         options.sensor.exposure = 1.8;
     });
@@ -197,7 +149,7 @@ fn pictures_that_show_no_grid_give_no_field() {
             | PictureError::FewSigns { .. }
     );
     assert!(expected, "{error}");
-    let blurred = taken(&crosses, 211, &|options| {
+    let blurred = sheet.taken(211, &|options| {
         coarse(options);
         options.sensor.blur_px = 6.0;
     });
@@ -211,8 +163,9 @@ fn pictures_that_show_no_grid_give_no_field() {
 
 #[test]
 fn patterns_and_lengths_that_do_not_fit_are_named() {
-    let crosses = pattern(MarkStyle::Cross, 9, 120.0);
-    let good = taken(&crosses, 212, &|options| options.camera.megapixels = Some(3.0));
+    let sheet = Sheet::new(MarkStyle::Cross, 9, 120.0);
+    let crosses = sheet.pattern();
+    let good = sheet.taken(212, &|options| options.camera.megapixels = Some(3.0));
     let error = |pattern: &Pattern, options: &PictureOptions| {
         find_field(&good.picture, pattern, options).unwrap_err()
     };

@@ -34,6 +34,17 @@ pub enum PictureError {
         /// The mark.
         id: String,
     },
+    /// A picture of another size than the camera's.
+    #[error(
+        "the picture has {} x {} pixels, the camera file is of {} x {}: take it with the same camera \
+         and settings", found[0], found[1], known[0], known[1]
+    )]
+    OtherSize {
+        /// Width and height, px.
+        found: [usize; 2],
+        /// Those of the camera file.
+        known: [usize; 2],
+    },
     /// Too few signs of a sheet.
     #[error(
         "{n_found} of the sheet's {n_signs} printed signs are in the picture, the limit is {limit}: \
@@ -191,6 +202,9 @@ impl PictureError {
             Self::NotAGrid { id } => three("pattern mark", id.clone(), "rows and columns".into()),
             Self::FewSigns { n_found, limit, .. } => {
                 three("signs", n_found.to_string(), limit.to_string())
+            }
+            Self::OtherSize { found: [w, h], known: [width, height] } => {
+                three("picture", format!("{w} x {h}"), format!("{width} x {height}"))
             }
             Self::StrangeSign { number } => {
                 three("sign", number.to_string(), "those of the pattern".into())

@@ -16,6 +16,7 @@ pub fn measure(arguments: &PictureArguments) -> Result<Vec<FieldPicture>, Error>
         sheet_mm: [arguments.sheet_x_mm, arguments.sheet_y_mm],
         lens: camera.as_ref().map(|camera| camera.lens),
         view: camera.as_ref().and_then(|camera| camera.view),
+        size_px: camera.as_ref().and_then(|camera| camera.size_px),
         mm_per_px: arguments.um_per_px.map(|um| um * 1e-3),
         placement: arguments.placement.into(),
     };

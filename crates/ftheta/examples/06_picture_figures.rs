@@ -1,20 +1,69 @@
-//! Delays found in photographs of the twin, beside the figures asked for.
+//! Delays and fields found in photographs of the twin, beside the figures asked for.
 //!
-//! `cargo run --release -p ftheta --example 06_delay_figures [PICTURES]`
+//! `cargo run --release -p ftheta --example 06_picture_figures [PICTURES]`
 #![allow(clippy::unwrap_used, reason = "a campaign may stop at once")]
 
 #[path = "../tests/comb/mod.rs"]
 mod comb;
+#[path = "../tests/sheet_picture/mod.rs"]
+mod sheet_picture;
 
 use comb::Setup;
+use ftheta::model::pattern::MarkStyle;
 use ftheta::pattern::delay::LineAxis;
 use ftheta::photograph::PowerRule;
+use sheet_picture::Sheet;
 
 /// Seed of the first picture of a row.
 const FIRST_SEED: u64 = 2000;
 
 fn main() {
     let n: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(50);
+    delays(n);
+    fields(n);
+}
+
+/// Marks of grids in 12 megapixels: what is asked for is 289 of 289, none false, 12 µm.
+fn fields(n: u64) {
+    println!("marks over {n} pictures of 12 megapixels, seeds from {FIRST_SEED}");
+    for (name, sheet) in [
+        ("17 x 17 crosses, 240 mm", Sheet::new(MarkStyle::Cross, 17, 240.0)),
+        (
+            "17 x 17 crosses, print without errors",
+            Sheet { print_errors: false, ..Sheet::new(MarkStyle::Cross, 17, 240.0) },
+        ),
+        ("17 x 17 dots, 240 mm", Sheet::new(MarkStyle::Dot, 17, 240.0)),
+        ("9 x 9 crosses, 120 mm", Sheet::new(MarkStyle::Cross, 9, 120.0)),
+        ("65 x 65 crosses, 240 mm", Sheet::new(MarkStyle::Cross, 65, 240.0)),
+    ] {
+        let n = if sheet.n_side > 17 { n.div_ceil(10) } else { n };
+        let all: Vec<_> = (0..n).map(|seed| sheet.tally(FIRST_SEED + seed)).collect();
+        let found: Vec<_> = all.iter().flatten().collect();
+        let total = |of: fn(&sheet_picture::Tally) -> usize| {
+            found.iter().map(|tally| of(tally)).sum::<usize>()
+        };
+        let mean = |of: fn(&sheet_picture::Tally) -> f64| {
+            found.iter().map(|tally| of(tally)).sum::<f64>() / found.len() as f64
+        };
+        let most = found.iter().map(|tally| tally.left_um).fold(0.0, f64::max);
+        println!(
+            "{name:42} lost {} of {}, false {}  {:.3} px  against the truth {:5.1} µm, less place, \
+             turn and scale {:4.1} µm (most {most:.1}), rms along an axis  refused {}",
+            total(|t| t.n_lost),
+            total(|t| t.n_burned),
+            total(|t| t.n_false),
+            mean(|t| t.off_px),
+            mean(|t| t.off_um),
+            mean(|t| t.left_um),
+            all.len() - found.len(),
+        );
+        if let Some(Err(error)) = all.iter().find(|tally| tally.is_err()) {
+            println!("    refused: {error}");
+        }
+    }
+}
+
+fn delays(n: u64) {
     println!("errors over {n} pictures, seeds from {FIRST_SEED}, mean ± deviation, µs");
     let comb = Setup::comb();
     let constant = Some(PowerRule::Constant);
