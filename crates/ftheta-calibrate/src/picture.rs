@@ -11,32 +11,25 @@ mod grid;
 mod guess;
 mod lattice;
 mod quad;
+pub mod sheet;
 mod signs;
 mod view_fit;
 
 use crate::raster::flat::Flat;
 use candidates::{Ground, Shape};
 use error::PictureError;
-use ftheta_model::pattern::{FeatureShape, Pattern};
+use ftheta_model::pattern::Pattern;
 use ftheta_model::picture::{Picture, PixelPoint, Sighting};
 use ftheta_model::space::FieldPoint;
-use ftheta_model::tag;
 use ftheta_physics::camera::{CameraLens, Seen, View};
 use grid::Grid;
 use lattice::Lattice;
-use signs::{Sign, find_signs};
+use sheet::{SignsFound, fiducials, signs_of};
 use view_fit::fit_view;
 
-/// Fewest signs, and the share of the sheet's, that a view is fitted to.
-const N_SIGNS_MIN: usize = 4;
-const SIGNS_SHARE: f64 = 0.5;
-/// With a lens that is not known there have to be more.
-const N_SIGNS_FREE: usize = 8;
 /// Signs are no farther off the fitted view than this, px rms, or as far as printers are off, mm.
 const BENT_PX: f64 = 0.6;
 const BENT_MM: f64 = 0.04;
-/// Printers are no farther off than this, percent.
-const PRINT_PERCENT: f64 = 3.0;
 /// Share of the marks that has to be found.
 const MARKS_SHARE: f64 = 0.7;
 /// Smallest mark, px.
@@ -142,10 +135,18 @@ impl SignSeen {
 
 /// What tells lengths in a picture.
 enum Ruler {
-    /// A view of the plane, with signs if they gave it.
-    View { view: View, seen: Seen, rms_px: f64, signs: Vec<SignSeen> },
+    /// A view of the plane.
+    View(Box<KnownView>),
     /// A scanner.
     Scale(f64),
+}
+
+/// A view of the plane, with signs if they gave it.
+struct KnownView {
+    view: View,
+    seen: Seen,
+    rms_px: f64,
+    signs: Vec<SignSeen>,
 }
 
 /// Finds the marks of a pattern's grid in a picture.
@@ -166,7 +167,8 @@ pub fn find_field(
     contrast(&flat)?;
     let ruler = ruler(picture, &flat, pattern, options)?;
     let found = match &ruler {
-        Ruler::View { view, seen, signs, .. } => {
+        Ruler::View(known) => {
+            let KnownView { view, seen, signs, .. } = known.as_ref();
             let in_sign = |pixel: PixelPoint| signs.iter().any(|sign| sign.holds(pixel));
             let shape =
                 |pixel: PixelPoint| grid.shape(view, seen, pixel).filter(|_| !in_sign(pixel));
@@ -176,7 +178,7 @@ pub fn find_field(
         Ruler::Scale(_) => without_signs(picture, &flat, &grid)?,
     };
     let low = match &ruler {
-        Ruler::View { seen, .. } => grid.anchored(&found.lattice, &found.marks, Some(seen))?,
+        Ruler::View(known) => grid.anchored(&found.lattice, &found.marks, Some(&known.seen))?,
         Ruler::Scale(_) => grid.anchored(&found.lattice, &found.marks, None)?,
     };
     let pixels = grid.pixels(&found.lattice, &found.marks, low);
@@ -184,8 +186,8 @@ pub fn find_field(
     Ok(assembled(&grid, found, pixels, ruler, options.placement))
 }
 
-/// Centres of a pattern's marks in a picture of which nothing is known, for those who have their own
-/// ruler: as [`find_field`] finds them, without lengths.
+/// Centres of a pattern's marks in a picture of which nothing is known, for those who have a ruler
+/// of their own: as [`find_field`] finds them, without lengths.
 ///
 /// # Errors
 /// If the picture does not show the pattern, or not well enough.
@@ -211,7 +213,8 @@ fn ruler(
 ) -> Result<Ruler, PictureError> {
     if let Some(view) = options.view {
         let seen = view.inverse().ok_or(PictureError::NoScale)?;
-        return Ok(Ruler::View { view, seen, rms_px: 0.0, signs: Vec::new() });
+        let known = KnownView { view, seen, rms_px: 0.0, signs: Vec::new() };
+        return Ok(Ruler::View(Box::new(known)));
     }
     if let Some(mm_per_px) = options.mm_per_px {
         return Ok(Ruler::Scale(mm_per_px));
@@ -232,136 +235,14 @@ fn ruler(
         kept,
     });
     let signs = signs.collect();
-    Ok(Ruler::View { view: fitted.view, seen: fitted.seen, rms_px: fitted.rms_px, signs })
-}
-
-/// Signs in a picture, where their corners are on the sheet, and how many are enough.
-struct SignsFound {
-    found: Vec<Sign>,
-    sightings: Vec<Vec<Sighting>>,
-    limit: usize,
-}
-
-fn signs_of(
-    picture: &Picture,
-    flat: &Flat,
-    pattern: &Pattern,
-    options: &PictureOptions,
-) -> Result<SignsFound, PictureError> {
-    let fiducials = fiducials(pattern);
-    if fiducials.is_empty() {
-        return Err(PictureError::NoScale);
-    }
-    let scale = sheet_scale(pattern, options.sheet_mm)?;
-    let found = find_signs(picture, flat);
-    let sightings = sign_sightings(&found, &fiducials, scale)?;
-    let n_least = if options.lens.is_some() { N_SIGNS_MIN } else { N_SIGNS_FREE };
-    let limit = n_least.max((SIGNS_SHARE * fiducials.len() as f64) as usize);
-    if sightings.len() < limit {
-        let (n_found, n_signs) = (sightings.len(), fiducials.len());
-        return Err(PictureError::FewSigns { n_found, n_signs, limit });
-    }
-    Ok(SignsFound { found, sightings, limit })
-}
-
-/// Corners of a sheet's signs in a picture, sign by sign.
-///
-/// * `sheet_mm`: what the sheet's printed lines along x and y measure, mm
-///
-/// # Errors
-/// If there are too few signs, or they are not the sheet's.
-pub fn sheet_sightings(
-    picture: &Picture,
-    pattern: &Pattern,
-    sheet_mm: [Option<f64>; 2],
-) -> Result<Vec<Vec<Sighting>>, PictureError> {
-    let flat = Flat::new(picture);
-    contrast(&flat)?;
-    let options = PictureOptions { sheet_mm, ..PictureOptions::default() };
-    Ok(signs_of(picture, &flat, pattern, &options)?.sightings)
+    let view_fit::FittedView { view, seen, rms_px, .. } = fitted;
+    Ok(Ruler::View(Box::new(KnownView { view, seen, rms_px, signs })))
 }
 
 /// Scale in the middle of the plane.
 fn px_per_mm(view: &View) -> f64 {
     let at = |x: f64| view.pixel(FieldPoint::new(x, 0.0));
     at(0.0).zip(at(1.0)).map_or(0.0, |(a, b)| a.distance(b))
-}
-
-/// Printed signs of a pattern: number, centre and side, mm.
-fn fiducials(pattern: &Pattern) -> Vec<(usize, FieldPoint, f64)> {
-    let printed = pattern.features.iter().filter_map(|feature| match &feature.shape {
-        FeatureShape::Fiducial { family, code, place_mm, size_mm, burned: false }
-            if family == tag::FAMILY =>
-        {
-            Some((code.parse().ok()?, *place_mm, *size_mm))
-        }
-        _ => None,
-    });
-    printed.collect()
-}
-
-/// Corners of the signs as they lie on the printed sheet.
-///
-/// # Errors
-/// If a sign is not the sheet's, there twice, or mirrored.
-fn sign_sightings(
-    found: &[Sign],
-    fiducials: &[(usize, FieldPoint, f64)],
-    scale: [f64; 2],
-) -> Result<Vec<Vec<Sighting>>, PictureError> {
-    let n_mirrored = found.iter().filter(|sign| sign.mirrored).count();
-    if 2 * n_mirrored > found.len() {
-        return Err(PictureError::Mirrored);
-    }
-    let mut groups = Vec::with_capacity(found.len());
-    for (index, sign) in found.iter().enumerate() {
-        let number = sign.number;
-        if found[..index].iter().any(|other| other.number == number) {
-            return Err(PictureError::SignTwice { number });
-        }
-        let known = fiducials.iter().find(|(known, ..)| *known == number);
-        let (_, centre, side_mm) = known.ok_or(PictureError::StrangeSign { number })?;
-        let half = 0.5 * side_mm;
-        let corners = [(-half, half), (half, half), (half, -half), (-half, -half)];
-        let sighting = |((dx, dy), pixel): ((f64, f64), &PixelPoint)| Sighting {
-            place_mm: FieldPoint::new(scale[0] * (centre.x_mm + dx), scale[1] * (centre.y_mm + dy)),
-            pixel: *pixel,
-        };
-        groups.push(corners.into_iter().zip(&sign.corners).map(sighting).collect());
-    }
-    Ok(groups)
-}
-
-/// Printed over drawn length along x and y.
-///
-/// # Errors
-/// If a line that is there was not measured, or cannot have this length.
-fn sheet_scale(pattern: &Pattern, sheet_mm: [Option<f64>; 2]) -> Result<[f64; 2], PictureError> {
-    let mut scale = [1.0; 2];
-    for (index, axis) in ['x', 'y'].into_iter().enumerate() {
-        let Some(nominal_mm) = printed_line_mm(pattern, index) else { continue };
-        let measured_mm = sheet_mm[index].ok_or(PictureError::SheetSize { axis, nominal_mm })?;
-        scale[index] = measured_mm / nominal_mm;
-        let limit_percent = PRINT_PERCENT;
-        if (scale[index] - 1.0).abs() * 100.0 > limit_percent || !scale[index].is_finite() {
-            let wrong =
-                PictureError::WrongSheetSize { axis, nominal_mm, measured_mm, limit_percent };
-            return Err(wrong);
-        }
-    }
-    Ok(scale)
-}
-
-/// Length of the longest printed reference line along x (0) or y (1), mm.
-fn printed_line_mm(pattern: &Pattern, axis: usize) -> Option<f64> {
-    let lines = pattern.features.iter().filter_map(|feature| match &feature.shape {
-        FeatureShape::Reference { from_mm, to_mm, burned: false } => {
-            let (dx, dy) = (to_mm.x_mm - from_mm.x_mm, to_mm.y_mm - from_mm.y_mm);
-            (usize::from(dy.abs() > dx.abs()) == axis).then_some(dx.hypot(dy))
-        }
-        _ => None,
-    });
-    lines.reduce(f64::max)
 }
 
 /// How marks look, and how far they are from each other, at a place of the picture.
@@ -477,8 +358,9 @@ fn assembled(
     placement: Placement,
 ) -> FieldSeen {
     let measured: Vec<Option<FieldPoint>> = match &ruler {
-        Ruler::View { seen, .. } => {
-            pixels.iter().map(|pixel| pixel.and_then(|pixel| seen.place(pixel))).collect()
+        Ruler::View(known) => {
+            let place = |pixel: &Option<PixelPoint>| known.seen.place((*pixel)?);
+            pixels.iter().map(place).collect()
         }
         Ruler::Scale(mm_per_px) => pixels
             .iter()
@@ -503,7 +385,7 @@ fn assembled(
     });
     let marks = marks.collect();
     let (view, view_rms_px, signs) = match ruler {
-        Ruler::View { view, rms_px, signs, .. } => (Some(view), rms_px, signs),
+        Ruler::View(known) => (Some(known.view), known.rms_px, known.signs),
         Ruler::Scale(_) => (None, 0.0, Vec::new()),
     };
     let (bright, oriented) = (found.bright, view.is_some());

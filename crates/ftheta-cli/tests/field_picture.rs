@@ -1,5 +1,5 @@
-//! The command line contract of pictures: `ftheta pattern grid --fiducials`, `ftheta calibrate field
-//! --image`, `ftheta calibrate camera`.
+//! The command line contract of `ftheta pattern grid --fiducials`, `ftheta calibrate field --image`
+//! and `ftheta calibrate camera`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop at once")]
 

@@ -92,7 +92,8 @@ pub fn read(bytes: &[u8]) -> Result<CameraFile, CameraFileError> {
     }
     let name = DISTORTION.into_iter().find(|name| !root[name].is_null()).unwrap_or(DISTORTION[0]);
     let mut bending = numbers(&root[name]);
-    if bending.len() < 4 || bending.len() > 5 || bending.iter().any(|k| !(k.abs() <= BENDING_MAX)) {
+    let plausible = bending.iter().all(|k| k.abs() <= BENDING_MAX);
+    if !(4..=5).contains(&bending.len()) || !plausible {
         return Err(wrong(name, &root[name], "k1, k2, p1, p2 and perhaps k3"));
     }
     bending.resize(5, 0.0);

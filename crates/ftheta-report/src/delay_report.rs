@@ -157,8 +157,8 @@ fn regression(out: &mut String, input: &DelayReportInput<'_>) {
     }
     out.push_str(
         "<section><h2>Where lines begin and end, over speed</h2><p class=note>Behind the nominal \
-         ends in the direction of marking, mean of lines both ways. The slope is the delay; what is \
-         left at rest is the growth of the ends.</p>",
+         ends in the direction of marking, mean of lines both ways. The slope is the delay; what \
+         is left at rest is the growth of the ends.</p>",
     );
     let cloud = |index: usize| Cloud {
         name: ["starts", "stops"][index],

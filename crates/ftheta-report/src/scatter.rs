@@ -21,6 +21,51 @@ pub struct Cloud<'a> {
     pub line: Vec<(f64, f64)>,
 }
 
+/// From values to places in the picture.
+struct Scale {
+    x: (f64, f64),
+    y: (f64, f64),
+}
+
+impl Scale {
+    fn px(&self, x: f64) -> f64 {
+        LEFT + (WIDTH - LEFT - RIGHT) * (x - self.x.0) / (self.x.1 - self.x.0)
+    }
+
+    fn py(&self, y: f64) -> f64 {
+        BOTTOM - (BOTTOM - TOP) * (y - self.y.0) / (self.y.1 - self.y.0)
+    }
+}
+
+fn grid(out: &mut String, scale: &Scale) {
+    let step = tick_step(scale.y.1 - scale.y.0, 6.0);
+    for y in ticks(scale.y.0, scale.y.1, step) {
+        let (at, label) = (scale.py(y), tick(y, step));
+        put(
+            out,
+            format_args!(
+                "<path class=grid d='M{LEFT} {at:.1}H{}'/><text x='{}' y='{:.1}' \
+                 text-anchor=end>{label}</text>",
+                WIDTH - RIGHT,
+                LEFT - 7.0,
+                at + 4.0
+            ),
+        );
+    }
+    let step = tick_step(scale.x.1 - scale.x.0, 10.0);
+    for x in ticks(scale.x.0, scale.x.1, step) {
+        let (at, label) = (scale.px(x), tick(x, step));
+        put(
+            out,
+            format_args!(
+                "<path class=grid d='M{at:.1} {TOP}V{BOTTOM}'/><text x='{at:.1}' y='{}' \
+                 text-anchor=middle>{label}</text>",
+                BOTTOM + 16.0
+            ),
+        );
+    }
+}
+
 /// A chart of clouds over the same axes; not finite values are left out.
 pub fn svg(clouds: &[Cloud<'_>], labels: [&str; 2]) -> String {
     let all = || {
@@ -34,36 +79,10 @@ pub fn svg(clouds: &[Cloud<'_>], labels: [&str; 2]) -> String {
         let room = 0.06 * (high - low).max(1e-9);
         (low - room, high + room)
     };
-    let (x_range, y_range) = (range(|point| point.0), range(|point| point.1));
-    let px = |x: f64| LEFT + (WIDTH - LEFT - RIGHT) * (x - x_range.0) / (x_range.1 - x_range.0);
-    let py = |y: f64| BOTTOM - (BOTTOM - TOP) * (y - y_range.0) / (y_range.1 - y_range.0);
+    let scale = Scale { x: range(|point| point.0), y: range(|point| point.1) };
     let mut out = format!("<svg class=chart viewBox='0 0 {WIDTH} {HEIGHT}' role=img>");
-    let step = tick_step(y_range.1 - y_range.0, 6.0);
-    for y in ticks(y_range.0, y_range.1, step) {
-        let (at, label) = (py(y), tick(y, step));
-        put(
-            &mut out,
-            format_args!(
-                "<path class=grid d='M{LEFT} {at:.1}H{}'/><text x='{}' y='{:.1}' \
-                 text-anchor=end>{label}</text>",
-                WIDTH - RIGHT,
-                LEFT - 7.0,
-                at + 4.0
-            ),
-        );
-    }
-    let step = tick_step(x_range.1 - x_range.0, 10.0);
-    for x in ticks(x_range.0, x_range.1, step) {
-        let (at, label) = (px(x), tick(x, step));
-        put(
-            &mut out,
-            format_args!(
-                "<path class=grid d='M{at:.1} {TOP}V{BOTTOM}'/><text x='{at:.1}' y='{}' \
-                 text-anchor=middle>{label}</text>",
-                BOTTOM + 16.0
-            ),
-        );
-    }
+    grid(&mut out, &scale);
+    let (px, py) = (|x: f64| scale.px(x), |y: f64| scale.py(y));
     for cloud in clouds {
         put(&mut out, format_args!("<path class=line stroke='{}' d='", cloud.color));
         for (index, (x, y)) in cloud.line.iter().enumerate() {

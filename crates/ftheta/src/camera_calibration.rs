@@ -4,7 +4,7 @@ use crate::Error;
 use crate::field_picture::Source;
 use ftheta_calibrate::picture::camera::{N_PICTURES_MIN, fit_camera};
 use ftheta_calibrate::picture::error::PictureError;
-use ftheta_calibrate::picture::sheet_sightings;
+use ftheta_calibrate::picture::sheet::sheet_sightings;
 use ftheta_formats::camera_file::CameraFile;
 use ftheta_model::pattern::Pattern;
 use thiserror::Error as ThisError;

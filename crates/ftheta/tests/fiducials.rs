@@ -1,5 +1,4 @@
-//! Marks of grids in photographs that the twin takes, from the sheet to the table, and pictures that
-//! give none.
+//! Marks of grids in photographs that the twin takes, and pictures that give none.
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
 mod sheet_picture;
@@ -12,8 +11,8 @@ use ftheta::photograph::{Photograph, PhotographOptions};
 use sheet_picture::{Sheet, tally};
 use std::path::Path;
 
-/// All marks that were burned are found, none else, and where they are: in the picture to hundredths
-/// of a pixel, in the field to what the print of signs leaves, rms along each axis.
+/// All marks that were burned are found, none else, and where they are: in the picture to
+/// hundredths of a pixel, in the field to what the print of signs leaves, rms along each axis.
 fn whole(name: &str, seen: &FieldSeen, photograph: &Photograph, [px, um]: [f64; 2]) {
     let tally = tally(seen, photograph);
     assert_eq!((tally.n_lost, tally.n_false), (0, 0), "{name}: {tally:?}");

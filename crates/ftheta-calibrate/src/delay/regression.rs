@@ -1,8 +1,8 @@
 //! Delays from where lines of several speeds begin and end.
 //!
 //! With s = ±1 the way a line runs, v its speed: its start lies `s (v τ_on - v²/2a - b)` beyond the
-//! nominal one and its stop `s (v τ_off - v²/2a + b)`, both shifted by where the pattern lies. Lines
-//! both ways separate the shift, several speeds the growth b. Source: optics.md D.2 and D.3.
+//! nominal one and its stop `s (v τ_off - v²/2a + b)`, both shifted by where the pattern lies.
+//! Lines both ways separate the shift, several speeds the growth b. Source: optics.md D.2 and D.3.
 
 use super::growth::Growth;
 use nalgebra::{DMatrix, DVector};

@@ -35,6 +35,13 @@ pub struct Candidate {
     pub strength: f64,
 }
 
+/// Places on an arm, and those beside it.
+#[derive(Clone)]
+struct Arm<T> {
+    on: Vec<T>,
+    beside: Vec<T>,
+}
+
 /// How a mark looks somewhere in the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
@@ -51,7 +58,7 @@ impl Shape {
     }
 
     /// Places on each arm, and those beside it.
-    fn places(&self) -> Vec<(Vec<[f64; 2]>, Vec<[f64; 2]>)> {
+    fn places(&self) -> Vec<Arm<[f64; 2]>> {
         let [x, y] = self.arms_px;
         let at = |u: f64, v: f64| [u * x[0] + v * y[0], u * x[1] + v * y[1]];
         let beside = BESIDE_ARM.max(BESIDE_MIN_PX / self.reach_px());
@@ -62,14 +69,14 @@ impl Shape {
                     let sides = ALONG_ARM
                         .into_iter()
                         .flat_map(|t| [beside, -beside].map(|s| at(t * u + s * v, t * v + s * u)));
-                    (on, sides.collect())
+                    Arm { on, beside: sides.collect() }
                 })
-                .to_vec(),
+                .into(),
             MarkStyle::Dot => (0..8)
                 .map(|index| {
                     let (sin, cos) = (f64::from(index) * std::f64::consts::FRAC_PI_4).sin_cos();
                     let on = vec![[0.0; 2], at(INSIDE_DOT * cos, INSIDE_DOT * sin)];
-                    (on, vec![at(AROUND_DOT * cos, AROUND_DOT * sin)])
+                    Arm { on, beside: vec![at(AROUND_DOT * cos, AROUND_DOT * sin)] }
                 })
                 .collect(),
         }
@@ -128,7 +135,7 @@ pub fn candidates(
 struct Tile<'a> {
     ground: &'a Ground<'a>,
     /// On and beside each arm, as steps in memory.
-    arms: Vec<(Vec<isize>, Vec<isize>)>,
+    arms: Vec<Arm<isize>>,
     reach: usize,
 }
 
@@ -143,7 +150,8 @@ impl<'a> Tile<'a> {
             };
             places.iter().map(step).collect()
         };
-        let arms = places.iter().map(|(on, beside)| (steps(on), steps(beside))).collect();
+        let arms = places.iter().map(|arm| Arm { on: steps(&arm.on), beside: steps(&arm.beside) });
+        let arms = arms.collect();
         Self { ground, arms, reach: reach.ceil() as usize + 1 }
     }
 
@@ -161,7 +169,7 @@ impl<'a> Tile<'a> {
             steps.iter().map(|step| off[(here + step) as usize]).sum::<f32>() / steps.len() as f32
         };
         let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for (on, beside) in &self.arms {
+        for Arm { on, beside } in &self.arms {
             let differs = mean(beside) - mean(on);
             (low, high) = (low.min(differs), high.max(differs));
             if low < least && high > -least {

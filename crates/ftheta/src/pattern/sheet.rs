@@ -75,7 +75,8 @@ impl Sheet {
     }
 
     /// Writes `OUT` (the drawing) and beside it `.json`, `.recipe.toml`, `.csv` if there are places
-    /// to measure, `.sheet.pdf` and `.sheet.svg` if there is a sheet; returns kind and path of each.
+    /// to measure, `.sheet.pdf` and `.sheet.svg` if there is a sheet; returns kind and path of
+    /// each.
     ///
     /// # Errors
     /// If a file cannot be written, `out` does not end in `.svg`, or the table beside it has been
