@@ -1,6 +1,6 @@
 //! Delays and fields found in photographs of the twin, beside the figures asked for.
 //!
-//! `cargo run --release -p ftheta --example 06_picture_figures [PICTURES]`
+//! `cargo run --release -p ftheta --example 06_picture_figures [PICTURES [ROWS]]`, where `ROWS` is a part of their names
 #![allow(clippy::unwrap_used, reason = "a campaign may stop at once")]
 
 #[path = "../tests/comb/mod.rs"]
@@ -19,12 +19,13 @@ const FIRST_SEED: u64 = 2000;
 
 fn main() {
     let n: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(50);
-    delays(n);
-    fields(n);
+    let rows = std::env::args().nth(2).unwrap_or_default();
+    delays(n, &rows);
+    fields(n, &rows);
 }
 
 /// Marks of grids in 12 megapixels: what is asked for is 289 of 289, none false, 12 µm.
-fn fields(n: u64) {
+fn fields(n: u64, rows: &str) {
     println!("marks over {n} pictures of 12 megapixels, seeds from {FIRST_SEED}");
     for (name, sheet) in [
         ("17 x 17 crosses, 240 mm", Sheet::new(MarkStyle::Cross, 17, 240.0)),
@@ -36,6 +37,9 @@ fn fields(n: u64) {
         ("9 x 9 crosses, 120 mm", Sheet::new(MarkStyle::Cross, 9, 120.0)),
         ("65 x 65 crosses, 240 mm", Sheet::new(MarkStyle::Cross, 65, 240.0)),
     ] {
+        if !name.contains(rows) {
+            continue;
+        }
         let n = if sheet.n_side > 17 { n.div_ceil(10) } else { n };
         let all: Vec<_> = (0..n).map(|seed| sheet.tally(FIRST_SEED + seed)).collect();
         let found: Vec<_> = all.iter().flatten().collect();
@@ -63,7 +67,7 @@ fn fields(n: u64) {
     }
 }
 
-fn delays(n: u64) {
+fn delays(n: u64, rows: &str) {
     println!("errors over {n} pictures, seeds from {FIRST_SEED}, mean ± deviation, µs");
     let comb = Setup::comb();
     let constant = Some(PowerRule::Constant);
@@ -90,6 +94,9 @@ fn delays(n: u64) {
         ("rectangle, 5 m/s", Setup::rectangle(), "5.5 is the patent's"),
         ("rectangle, spot of 30 µm", Setup { spot_um: 30.0, ..Setup::rectangle() }, ""),
     ] {
+        if !name.contains(rows) {
+            continue;
+        }
         let results: Vec<_> = (0..n).map(|seed| setup.errors(FIRST_SEED + seed)).collect();
         let found: Vec<_> = results.iter().flatten().collect();
         let row = |value: fn(&comb::Errors) -> f64| {

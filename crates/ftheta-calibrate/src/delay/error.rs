@@ -99,7 +99,7 @@ pub enum DelayError {
     /// Two ways to lay the pattern on the picture.
     #[error(
         "it cannot be told how the picture lies: one way leaves {first_px:.1} px, another \
-         {second_px:.1} px, and the limit is twice as much; take the whole pattern with its \
+         {second_px:.1} px, the limit is {limit_px:.1} px; take the whole pattern with its \
          reference lines"
     )]
     Orientation {
@@ -107,6 +107,8 @@ pub enum DelayError {
         first_px: f64,
         /// What the next one leaves, px.
         second_px: f64,
+        /// Least of it, px.
+        limit_px: f64,
     },
     /// References that are not in the picture, or others beside them.
     #[error(
@@ -242,11 +244,9 @@ impl DelayError {
             Self::NotThePattern { n_lines } => {
                 ("lines", "elsewhere".into(), format!("the pattern's {n_lines}"))
             }
-            Self::Orientation { first_px, second_px } => (
-                "orientation, px",
-                format!("{second_px:.1}"),
-                format!("{:.1}", 2.0 * first_px.max(1.0)),
-            ),
+            Self::Orientation { second_px, limit_px, .. } => {
+                ("orientation, px", format!("{second_px:.1}"), format!("{limit_px:.1}"))
+            }
             Self::References { n_found, n_columns } => {
                 ("reference lines", n_found.to_string(), n_columns.to_string())
             }

@@ -16,13 +16,13 @@ const FOUND_SHARE: f64 = 0.8;
 const EXTRA_SHARE: f64 = 0.25;
 const N_EXTRA: f64 = 2.0;
 /// Weight of a burned reference along the lines by that of all lines.
-const REFERENCE: f64 = 0.05;
+const REFERENCE: f64 = 0.12;
 /// The best way leaves no more than this, px.
 const LEFT_PX: f64 = 12.0;
 /// Ways that leave no more than this agree with the picture, px.
 const AGREES_PX: f64 = 4.0;
 /// The right way to lay the pattern on the picture is better than any other by this factor.
-const CLEARLY: f64 = 2.0;
+const CLEARLY: f64 = 1.6;
 /// Ways that leave up to so many times the least are about as good.
 const ABOUT: f64 = 1.5;
 /// What coarse ends leave at least, px: differences below it mean nothing.
@@ -186,8 +186,8 @@ impl Frame {
         hypotheses: &'a [Hypothesis],
     ) -> Result<(&'a Hypothesis, bool), DelayError> {
         let best = &hypotheses[0];
-        let least_px = CLEARLY * best.left_px.max(COARSE_PX);
-        let Some(second) = hypotheses.get(1).filter(|second| second.left_px < least_px) else {
+        let limit_px = CLEARLY * best.left_px.max(COARSE_PX);
+        let Some(second) = hypotheses.get(1).filter(|second| second.left_px < limit_px) else {
             return Ok((best, false));
         };
         if best.left_px > AGREES_PX {
@@ -198,7 +198,10 @@ impl Frame {
         let upright = |hypothesis: &&Hypothesis| !self.upside_down(layout, hypothesis.flip[0]);
         match [best, second].into_iter().find(upright) {
             Some(upright) if same => Ok((upright, true)),
-            _ => Err(DelayError::Orientation { first_px: best.left_px, second_px: second.left_px }),
+            _ => {
+                let (first_px, second_px) = (best.left_px, second.left_px);
+                Err(DelayError::Orientation { first_px, second_px, limit_px })
+            }
         }
     }
 
@@ -243,8 +246,8 @@ impl Frame {
                 coarse.add(weight, known, [delays[0], delays[1], growth], end);
             }
         }
-        // References do not move, so they weigh as much as all lines together.
-        let weight = (coarse.len() as f64).sqrt();
+        // References do not move, so together they weigh half as much as all lines.
+        let weight = (0.5 * coarse.len() as f64 / layout.columns_mm.len().max(1) as f64).sqrt();
         if columns {
             let found = self.columns.iter().map(|column| sign * column.across_px * scale);
             let mut found: Vec<f64> = found.collect();
