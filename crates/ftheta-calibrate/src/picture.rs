@@ -22,7 +22,7 @@ use ftheta_model::pattern::Pattern;
 use ftheta_model::picture::{Picture, PixelPoint, Sighting};
 use ftheta_model::space::FieldPoint;
 use ftheta_physics::camera::{CameraLens, Seen, View};
-use grid::Grid;
+use grid::{Grid, Lie};
 use lattice::Lattice;
 use sheet::{SignsFound, fiducials, signs_of};
 use view_fit::fit_view;
@@ -30,8 +30,8 @@ use view_fit::fit_view;
 /// Signs are no farther off the fitted view than this, px rms, or as far as printers are off, mm.
 const BENT_PX: f64 = 0.6;
 const BENT_MM: f64 = 0.04;
-/// Share of the marks that has to be found.
-const MARKS_SHARE: f64 = 0.7;
+/// Turns of a grid on its sheet that are tried, degrees: plates are laid by hand.
+const TURNS_DEG: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
 /// Smallest mark, px.
 const SIZE_MIN_PX: f64 = 10.0;
 /// Two marks nearer than this, by half of one, are the same.
@@ -166,20 +166,13 @@ pub fn find_field(
     let flat = Flat::new(picture);
     contrast(&flat)?;
     let ruler = ruler(picture, &flat, pattern, options)?;
-    let found = match &ruler {
-        Ruler::View(known) => {
-            let KnownView { view, seen, signs, .. } = known.as_ref();
-            let in_sign = |pixel: PixelPoint| signs.iter().any(|sign| sign.holds(pixel));
-            let shape =
-                |pixel: PixelPoint| grid.shape(view, seen, pixel).filter(|_| !in_sign(pixel));
-            let ways = |pixel: PixelPoint| grid.ways(view, seen, pixel);
-            indexed(picture, &flat, &grid, &Looks { shape: &shape, ways: &ways })?
+    let (found, low) = match &ruler {
+        Ruler::View(known) => on_sheet(picture, &flat, &grid, known)?,
+        Ruler::Scale(_) => {
+            let found = without_signs(picture, &flat, &grid)?;
+            let low = grid.anchored(&found.lattice, &found.marks, None)?;
+            (found, low)
         }
-        Ruler::Scale(_) => without_signs(picture, &flat, &grid)?,
-    };
-    let low = match &ruler {
-        Ruler::View(known) => grid.anchored(&found.lattice, &found.marks, Some(&known.seen))?,
-        Ruler::Scale(_) => grid.anchored(&found.lattice, &found.marks, None)?,
     };
     let pixels = grid.pixels(&found.lattice, &found.marks, low);
     judge(picture, &grid, &found, &pixels)?;
@@ -289,11 +282,38 @@ fn indexed(
     Ok(Found { bright, marks, lattice })
 }
 
+/// Finds marks on a sheet, and which column and row is the lattice's first.
+fn on_sheet(
+    picture: &Picture,
+    flat: &Flat,
+    grid: &Grid,
+    known: &KnownView,
+) -> Result<(Found, [i32; 2]), PictureError> {
+    let KnownView { view, seen, signs, .. } = known;
+    let in_sign = |pixel: PixelPoint| signs.iter().any(|sign| sign.holds(pixel));
+    let mut best = Err(grid.few(0));
+    let mut n_most = 0;
+    for turn_deg in TURNS_DEG {
+        let lie = Lie { view, seen, turn_rad: turn_deg.to_radians() };
+        let shape = |pixel: PixelPoint| grid.shape(&lie, pixel).filter(|_| !in_sign(pixel));
+        let ways = |pixel: PixelPoint| grid.ways(&lie, pixel);
+        let found = indexed(picture, flat, grid, &Looks { shape: &shape, ways: &ways })?;
+        let n_found = found.lattice.len();
+        if n_found > n_most {
+            n_most = n_found;
+            let low = grid.anchored(&found.lattice, &found.marks, Some(&lie));
+            best = low.map(|low| (found, low));
+        }
+        if n_found >= grid.n_least() {
+            break;
+        }
+    }
+    best
+}
+
 /// Finds marks whose size and direction is guessed at first, and known once their grid is.
 fn without_signs(picture: &Picture, flat: &Flat, grid: &Grid) -> Result<Found, PictureError> {
-    let limit = (MARKS_SHARE * grid.n_marks() as f64).ceil() as usize;
-    let few = PictureError::FewMarks { n_found: 0, n_marks: grid.n_marks(), limit };
-    let guess = guess::guess(flat, picture.width(), grid.style()).ok_or(few)?;
+    let guess = guess::guess(flat, picture.width(), grid.style()).ok_or_else(|| grid.few(0))?;
     let shape = |_: PixelPoint| Some(guess.shape);
     let ways = |_: PixelPoint| Some(guess.ways_px);
     let first = indexed(picture, flat, grid, &Looks { shape: &shape, ways: &ways })?;
@@ -307,8 +327,9 @@ fn without_signs(picture: &Picture, flat: &Flat, grid: &Grid) -> Result<Found, P
         .collect();
     let size_px = [picture.width(), picture.height()];
     let Some(fitted) = fit_view(&groups, size_px, None) else { return Ok(first) };
-    let shape = |pixel: PixelPoint| grid.shape(&fitted.view, &fitted.seen, pixel);
-    let ways = |pixel: PixelPoint| grid.ways(&fitted.view, &fitted.seen, pixel);
+    let lie = Lie { view: &fitted.view, seen: &fitted.seen, turn_rad: 0.0 };
+    let shape = |pixel: PixelPoint| grid.shape(&lie, pixel);
+    let ways = |pixel: PixelPoint| grid.ways(&lie, pixel);
     indexed(picture, flat, grid, &Looks { shape: &shape, ways: &ways })
 }
 
@@ -320,7 +341,6 @@ fn judge(
     pixels: &[Option<PixelPoint>],
 ) -> Result<(), PictureError> {
     let n_found = pixels.iter().flatten().count();
-    let limit = (MARKS_SHARE * grid.n_marks() as f64).ceil() as usize;
     let saturated = |pixel: &&PixelPoint| {
         // The ground beside a mark, on its diagonals.
         let off = 0.2 * grid.size_px(pixels);
@@ -338,8 +358,8 @@ fn judge(
     if n_found > 0 && size_px < SIZE_MIN_PX {
         return Err(PictureError::Coarse { size_px, limit_px: SIZE_MIN_PX });
     }
-    if n_found < limit {
-        return Err(PictureError::FewMarks { n_found, n_marks: grid.n_marks(), limit });
+    if n_found < grid.n_least() {
+        return Err(grid.few(n_found));
     }
     let limit_px = BLURRED * size_px;
     match grid.line_width_px(picture, found.bright, pixels) {

@@ -12,6 +12,8 @@ use std::collections::HashMap;
 
 /// Marks lie in their row and column to this part of the pitch.
 const IN_LINE: f64 = 0.2;
+/// Share of the marks that has to be found.
+const MARKS_SHARE: f64 = 0.7;
 /// Marks at which the width of lines is looked at.
 const N_WIDTHS: usize = 40;
 
@@ -103,6 +105,16 @@ impl Grid {
         self.size
     }
 
+    /// Fewest marks that have to be found.
+    pub fn n_least(&self) -> usize {
+        (MARKS_SHARE * self.n_marks() as f64).ceil() as usize
+    }
+
+    /// That there are too few.
+    pub fn few(&self, n_found: usize) -> PictureError {
+        PictureError::FewMarks { n_found, n_marks: self.n_marks(), limit: self.n_least() }
+    }
+
     /// What they are.
     pub fn style(&self) -> MarkStyle {
         self.style
@@ -114,21 +126,21 @@ impl Grid {
     }
 
     /// How a mark would look at a pixel; `None` beyond the grid.
-    pub fn shape(&self, view: &View, seen: &Seen, pixel: PixelPoint) -> Option<Shape> {
-        let place = seen.place(pixel)?;
+    pub fn shape(&self, lie: &Lie<'_>, pixel: PixelPoint) -> Option<Shape> {
+        let place = lie.place(pixel)?;
         let far = [place.x_mm, place.y_mm].into_iter().enumerate().any(|(axis, mm)| {
             // A head's own errors, up to a pitch.
             let from = self.first_mm[axis] - self.pitch_mm[axis];
             let to = self.first_mm[axis] + self.size[axis] as f64 * self.pitch_mm[axis];
             !(from..=to).contains(&mm)
         });
-        let arms_px = axes(view, place, [0.5 * self.size_mm; 2])?;
+        let arms_px = lie.steps_px(pixel, [0.5 * self.size_mm; 2])?;
         (!far).then_some(Shape { style: self.style, arms_px })
     }
 
     /// From a column, and a row, to the next one at a pixel, px.
-    pub fn ways(&self, view: &View, seen: &Seen, pixel: PixelPoint) -> Option<[[f64; 2]; 2]> {
-        axes(view, seen.place(pixel)?, self.pitch_mm)
+    pub fn ways(&self, lie: &Lie<'_>, pixel: PixelPoint) -> Option<[[f64; 2]; 2]> {
+        lie.steps_px(pixel, self.pitch_mm)
     }
 
     /// Column and row of the pattern that the lattice's (0, 0) is.
@@ -139,21 +151,20 @@ impl Grid {
         &self,
         lattice: &Lattice,
         marks: &[PixelPoint],
-        seen: Option<&Seen>,
+        lie: Option<&Lie<'_>>,
     ) -> Result<[i32; 2], PictureError> {
         if lattice.is_empty() {
-            let (n_marks, limit) = (self.n_marks(), self.n_marks());
-            return Err(PictureError::FewMarks { n_found: 0, n_marks, limit });
+            return Err(self.few(0));
         }
         let (low, found) = extent(lattice);
         let other = PictureError::OtherGrid { found, known: self.size };
         let mut anchor = [0; 2];
         for axis in 0..2 {
             let room = self.size[axis] as i32 - found[axis] as i32;
-            if room < 0 || room > 0 && seen.is_none() {
+            if room < 0 || room > 0 && lie.is_none() {
                 return Err(other);
             }
-            let shift = seen.map_or(0.0, |seen| self.shift(lattice, marks, seen, axis));
+            let shift = lie.map_or(0.0, |lie| self.shift(lattice, marks, lie, axis));
             // As far as there is room for it: of a whole grid it is clear without a view.
             anchor[axis] = (shift.round() as i32).clamp(-low[axis], room - low[axis]);
         }
@@ -161,9 +172,9 @@ impl Grid {
     }
 
     /// By how many columns, or rows, the pattern's index is larger than the lattice's.
-    fn shift(&self, lattice: &Lattice, marks: &[PixelPoint], seen: &Seen, axis: usize) -> f64 {
+    fn shift(&self, lattice: &Lattice, marks: &[PixelPoint], lie: &Lie<'_>, axis: usize) -> f64 {
         let shifts = lattice.iter().filter_map(|(&(column, row), &mark)| {
-            let place = seen.place(marks[mark])?;
+            let place = lie.place(marks[mark])?;
             let (mm, index) = [(place.x_mm, column), (place.y_mm, row)][axis];
             Some((mm - self.first_mm[axis]) / self.pitch_mm[axis] - f64::from(index))
         });
@@ -272,12 +283,36 @@ impl Grid {
     }
 }
 
-/// Where steps along x and y lead in the picture, px.
-fn axes(view: &View, place: FieldPoint, steps_mm: [f64; 2]) -> Option<[[f64; 2]; 2]> {
-    let along = |dx: f64, dy: f64| {
-        let there = view.pixel(FieldPoint::new(place.x_mm + dx, place.y_mm + dy))?;
-        let here = view.pixel(FieldPoint::new(place.x_mm - dx, place.y_mm - dy))?;
-        Some([0.5 * (there.x_px - here.x_px), 0.5 * (there.y_px - here.y_px)])
-    };
-    Some([along(steps_mm[0], 0.0)?, along(0.0, steps_mm[1])?])
+/// How the grid lies before the camera: as the sheet does, but for a turn.
+#[derive(Clone, Copy, Debug)]
+pub struct Lie<'a> {
+    /// How the sheet is seen.
+    pub view: &'a View,
+    /// And the way back.
+    pub seen: &'a Seen,
+    /// By how much the grid is turned on the sheet, rad.
+    pub turn_rad: f64,
+}
+
+impl Lie<'_> {
+    /// The place that a pixel shows, in the grid's own directions, mm.
+    fn place(&self, pixel: PixelPoint) -> Option<FieldPoint> {
+        let place = self.seen.place(pixel)?;
+        let (sin, cos) = self.turn_rad.sin_cos();
+        let FieldPoint { x_mm, y_mm } = place;
+        Some(FieldPoint::new(cos * x_mm + sin * y_mm, cos * y_mm - sin * x_mm))
+    }
+
+    /// Where steps along the grid's x and y lead in the picture, px.
+    fn steps_px(&self, pixel: PixelPoint, steps_mm: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+        let place = self.seen.place(pixel)?;
+        let (sin, cos) = self.turn_rad.sin_cos();
+        let along = |dx: f64, dy: f64| {
+            let at = |dx: f64, dy: f64| FieldPoint::new(place.x_mm + dx, place.y_mm + dy);
+            let (there, here) = (self.view.pixel(at(dx, dy))?, self.view.pixel(at(-dx, -dy))?);
+            Some([0.5 * (there.x_px - here.x_px), 0.5 * (there.y_px - here.y_px)])
+        };
+        let [x, y] = steps_mm;
+        Some([along(cos * x, sin * x)?, along(-sin * y, cos * y)?])
+    }
 }
