@@ -1,6 +1,8 @@
 //! Delays and fields found in photographs of the twin, beside the figures asked for.
 //!
-//! `cargo run --release -p ftheta --example 06_picture_figures [PICTURES [ROWS]]`, where `ROWS` is a part of their names
+//! `cargo run --release -p ftheta --example 06_picture_figures [PICTURES [ROWS]]`
+//!
+//! `ROWS` is a part of the names of the rows to print.
 #![allow(clippy::unwrap_used, reason = "a campaign may stop at once")]
 
 #[path = "../tests/comb/mod.rs"]

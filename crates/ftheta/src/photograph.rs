@@ -34,6 +34,8 @@ const DARK_ON_BRIGHT: [f64; 4] = [0.78, 0.16, 0.78, 0.10];
 const BRIGHT_ON_DARK: [f64; 4] = [0.22, 0.80, 0.78, 0.08];
 /// Unevenness of anodised aluminium: brightness, threshold.
 pub const TEXTURE: [f64; 2] = [0.03, 0.05];
+/// How far printed signs are off one by one, mm rms along each axis.
+pub const PRINT_NOISE_MM: f64 = 0.015;
 /// What a caliper reads beside the truth, mm rms.
 const CALIPER_MM: f64 = 0.02;
 
@@ -92,6 +94,8 @@ pub struct PhotographOptions {
     pub bright: bool,
     /// By how much print is too large along x and y; from the seed if `None`.
     pub print_error: Option<[f64; 2]>,
+    /// How far a printed sign is off on top of that, mm rms along each axis.
+    pub print_noise_mm: f64,
     /// Where the printed sheet lies in the field: mm along x and y, and degrees anticlockwise.
     pub sheet_lies: [f64; 3],
     /// Unevenness of the material, relative: brightness, threshold.
@@ -138,6 +142,7 @@ impl PhotographOptions {
             },
             bright: false,
             print_error: None,
+            print_noise_mm: PRINT_NOISE_MM,
             sheet_lies: [0.0; 3],
             texture: TEXTURE,
         }
@@ -208,6 +213,7 @@ pub fn photograph(
     let [x_mm, y_mm, turn_deg] = options.sheet_lies;
     let lies = Affine::translate((x_mm, y_mm)) * Affine::rotate(turn_deg.to_radians());
     let mut printer = Printer::new(seed, lies, [plate, white, black]);
+    printer.noise_mm = options.print_noise_mm;
     if let Some(error) = options.print_error {
         printer.scale = error.map(|error| 1.0 + error);
     }

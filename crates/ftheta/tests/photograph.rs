@@ -55,6 +55,7 @@ fn options(machine: &Machine) -> PhotographOptions {
         },
         bright: false,
         print_error: None,
+        print_noise_mm: 0.015,
         sheet_lies: [0.0; 3],
         texture: [0.0; 2],
     }

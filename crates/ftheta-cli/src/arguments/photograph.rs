@@ -69,6 +69,9 @@ pub struct TwinPhotograph {
     /// By how much print is too large along x and y, percent; from the seed if not given.
     #[arg(long, value_name = "X,Y", value_parser = pair)]
     pub print_error: Option<[f64; 2]>,
+    /// How far each printed sign is off on top of that, µm rms.
+    #[arg(long, value_name = "S", default_value = "15", value_parser = noise)]
+    pub print_noise_um: f64,
     /// Where the printed sheet lies in the field, mm.
     #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = pair)]
     pub sheet_mm: [f64; 2],

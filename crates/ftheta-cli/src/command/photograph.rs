@@ -108,6 +108,7 @@ fn options(arguments: &TwinPhotograph, machine: &Machine) -> Result<PhotographOp
         },
         bright: arguments.bright,
         print_error: arguments.print_error.map(|error| error.map(|percent| percent * 1e-2)),
+        print_noise_mm: arguments.print_noise_um * 1e-3,
         sheet_lies: [x_mm, y_mm, arguments.sheet_deg],
         texture: TEXTURE.map(|part| part * arguments.texture),
     })

@@ -46,7 +46,7 @@ impl Printer {
             (2e-3 + 2e-3 * uniform(&mut random)).copysign(unit - 0.5)
         };
         let scale = [1.0 + drawn(), 1.0 + drawn()];
-        Self { scale, noise_mm: 0.015, lies, shades, random }
+        Self { scale, noise_mm: 0.0, lies, shades, random }
     }
 
     /// Where a place of the sheet's drawing lies in the field.

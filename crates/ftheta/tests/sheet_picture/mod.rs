@@ -17,7 +17,7 @@ pub struct Sheet {
     pub style: MarkStyle,
     pub n_side: u32,
     pub field_mm: f64,
-    /// Whether print is off by some tenths of a percent.
+    /// Whether print is off by some tenths of a percent, and sign by sign.
     pub print_errors: bool,
 }
 
@@ -64,14 +64,19 @@ impl Sheet {
         options.burn.missing = 0.03;
         options.burn.overburn = 3.0;
         options.sensor.n_dirt = 20;
-        options.print_error = (!self.print_errors).then_some([0.0; 2]);
+        if !self.print_errors {
+            options.print_error = Some([0.0; 2]);
+            options.print_noise_mm = 0.0;
+        }
         change(&mut options);
         photograph(&self.pattern(), &[], &machine(), &options, &mut |_| {}).unwrap()
     }
 
     pub fn seen(&self, photograph: &Photograph) -> Result<FieldSeen, PictureError> {
+        // A caliper is off too: where print is right its length is known.
+        let nominal_mm = photograph.caliper_mm.map(|mm| mm.map(|mm| (0.1 * mm).round() * 10.0));
         let options = PictureOptions {
-            sheet_mm: photograph.caliper_mm,
+            sheet_mm: if self.print_errors { photograph.caliper_mm } else { nominal_mm },
             placement: Placement::Sheet,
             ..PictureOptions::default()
         };
