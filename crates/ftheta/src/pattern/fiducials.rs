@@ -175,7 +175,11 @@ fn words(print: &mut Print, line_mm: f64, line_at_mm: f64, paper: &str) {
     let below = -line_at_mm - 0.5 * BAR_MM - 1.5 * LETTER_MM;
     let above = line_at_mm + LETTER_MM;
     for (text, y) in [
-        (format!("Print on {paper} at 100 %. The plate lies within the broken line."), above),
+        (
+            format!("Print on {paper} at 100 %. The plate lies within the broken line."),
+            above + 2.0 * LETTER_MM,
+        ),
+        ("Lay it so that the machine's x runs along these words.".to_owned(), above),
         (format!("Measure both long lines from bar to bar ({line_mm:.0} mm):"), below),
         (
             "--sheet-x-mm this one, --sheet-y-mm the one on the right".to_owned(),
