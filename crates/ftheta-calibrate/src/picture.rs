@@ -275,6 +275,7 @@ fn indexed(
     let mut all = lattice::lattices(&marks, looks.ways).into_iter();
     let mut lattice = all.next().unwrap_or_default();
     lattice::trim(&mut lattice, grid.size());
+    lattice::smooth(&mut lattice, &marks);
     let n_beside = all.next().map_or(0, |second| second.len());
     if n_beside > N_BESIDE.max((BESIDE_SHARE * lattice.len() as f64) as usize) {
         return Err(PictureError::TwoGrids { n_marks: lattice.len(), n_beside });

@@ -12,6 +12,9 @@ const GATE: f64 = 0.22;
 const GATE_BEYOND: f64 = 0.3;
 /// A row beyond the grid has no more marks than this part of a whole one.
 const STRAY: f64 = 0.3;
+/// A mark is off the middle of its neighbours by no more than so many times the usual, and px.
+const BENT: f64 = 8.0;
+const BENT_PX: f64 = 1.5;
 /// How much of a new way is taken over from the one before.
 const KEPT: f64 = 0.5;
 
@@ -136,6 +139,36 @@ pub fn trim(lattice: &mut Lattice, size: [usize; 2]) {
     }
 }
 
+/// Takes off marks that are off the middle of their neighbours, the worst first: lettering or dirt
+/// in the place of a mark.
+pub fn smooth(lattice: &mut Lattice, marks: &[PixelPoint]) {
+    let bent = |lattice: &Lattice, &(column, row): &(i32, i32)| {
+        let at = |c: i32, r: i32| lattice.get(&(column + c, row + r)).map(|&mark| marks[mark]);
+        let here = at(0, 0)?;
+        let pairs = [(1, 0), (0, 1)].into_iter().filter_map(|(c, r)| at(c, r).zip(at(-c, -r)));
+        let off = pairs.map(|(a, b)| {
+            let (x_px, y_px) = (0.5 * (a.x_px + b.x_px), 0.5 * (a.y_px + b.y_px));
+            here.distance(PixelPoint::new(x_px, y_px))
+        });
+        off.reduce(f64::min)
+    };
+    let mut sizes: Vec<f64> = lattice.keys().filter_map(|key| bent(lattice, key)).collect();
+    if sizes.is_empty() {
+        return;
+    }
+    let middle = sizes.len() / 2;
+    let limit_px = (BENT * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(BENT_PX);
+    for _ in 0..lattice.len() / 10 {
+        let worst = lattice.keys().filter_map(|key| Some((bent(lattice, key)?, *key)));
+        let worst = worst.filter(|(off, _)| *off > limit_px);
+        // Keys come in any order, and the result must not hang on it.
+        let Some((_, key)) = worst.max_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) else {
+            return;
+        };
+        lattice.remove(&key);
+    }
+}
+
 /// First column and row of a lattice, and how many there are of each.
 pub fn extent(lattice: &Lattice) -> ([i32; 2], [usize; 2]) {
     let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
@@ -176,6 +209,14 @@ mod tests {
         let found = lattices(&marks, &|_| Some([[41.0, 0.0], [0.0, -39.0]]));
         let largest = &found[0];
         assert_eq!(largest.len(), known.len());
+        // What is off its neighbours goes, and nothing else.
+        let (mut smoothed, mut bent) = (largest.clone(), marks.clone());
+        smooth(&mut smoothed, &marks);
+        assert_eq!(smoothed.len(), known.len());
+        bent[20].y_px += 6.0;
+        smooth(&mut smoothed, &bent);
+        assert_eq!(smoothed.len() + 1, known.len());
+        assert!(!smoothed.values().any(|&mark| mark == 20));
         let (low, size) = extent(largest);
         assert_eq!(size, [9, 7]);
         for (&(c, r), &mark) in largest {
