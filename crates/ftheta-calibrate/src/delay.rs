@@ -20,8 +20,10 @@ mod view;
 use error::DelayError;
 use ftheta_model::pattern::Pattern;
 use ftheta_model::picture::{Picture, PixelPoint};
+use ftheta_model::space::FieldPoint;
+use ftheta_physics::camera::View;
 use growth::{Growth, Look, SpeedWidth, growth};
-use layout::{Layout, RowProcess};
+use layout::{Layout, Row, RowProcess};
 use measured::{ROWS_WIDTHS, Reject, Scene, SeenLine};
 use regression::{LineEnd, Regression, WRONG_SHARE, regress};
 
@@ -137,6 +139,8 @@ pub struct Line {
 pub struct LineEndSeen {
     /// Where it is in the picture, if it was found.
     pub pixel: Option<PixelPoint>,
+    /// Where it would be without delays.
+    pub nominal: Option<PixelPoint>,
     /// How far it lies behind the nominal end in the direction of marking, growth and the pattern's
     /// place included, mm.
     pub off_mm: Option<f64>,
@@ -174,7 +178,7 @@ fn comb(picture: &Picture, layout: &Layout, speeds: &[f64]) -> Result<Delays, De
     let ends = observed.line_ends(layout, speeds);
     let regression = regress(&ends, &growth)
         .ok_or(DelayError::Uncertain { sd_us: f64::INFINITY, limit_us: UNCERTAIN_US })?;
-    let lines = lines(layout, &observed.lines, &ends, &regression);
+    let lines = lines(layout, &observed, &ends, &regression);
     judge(&lines, &regression)?;
     let limit_mm = observed.facts.mm_per_px * (1.0 + SCATTER_WIDTHS * observed.width_px);
     if regression.rms_mm > limit_mm {
@@ -207,6 +211,8 @@ struct Observed {
     /// Coarse width of all lines, px.
     width_px: f64,
     facts: SceneFacts,
+    /// How (along, across) of the pattern is seen.
+    view: View,
 }
 
 impl Observed {
@@ -245,7 +251,7 @@ impl Observed {
             upside_down: placement.upside_down,
             upright_assumed: placement.upright_assumed,
         };
-        Ok(Self { lines, width_px, facts })
+        Ok(Self { lines, width_px, facts, view: view.view })
     }
 
     /// How ends were looked at.
@@ -363,13 +369,18 @@ fn gate(seen: &[SeenLine], pitch_px: f64) -> Result<f64, DelayError> {
     Ok(blur_px)
 }
 
+/// Where an end of a row would be without delays.
+fn nominal(view: &View, row: &Row, end: usize) -> Option<PixelPoint> {
+    view.pixel(FieldPoint::new(row.ends_mm[end], row.across_mm))
+}
+
 fn lines(
     layout: &Layout,
-    seen: &[SeenLine],
+    observed: &Observed,
     ends: &[LineEnd],
     regression: &Regression,
 ) -> Vec<Line> {
-    let all = seen.iter().enumerate();
+    let (view, all) = (&observed.view, observed.lines.iter().enumerate());
     all.map(|(index, line)| {
         let row = &layout.rows[line.row];
         let of = |on: bool| {
@@ -378,6 +389,7 @@ fn lines(
             let wrong = fitted.is_some_and(|fitted| !regression.used[fitted]);
             LineEndSeen {
                 pixel: seen.ok().map(|end| end.pixel),
+                nominal: nominal(view, row, usize::from(!on)),
                 off_mm: fitted.map(|fitted| ends[fitted].sense * ends[fitted].off_mm),
                 left_mm: fitted.map(|fitted| regression.left_mm[fitted]),
                 reject: seen.err().or(wrong.then_some(Reject::Outlier)),

@@ -135,7 +135,7 @@ fn pictures(out: &mut String, views: &[(String, PictureView<'_>)]) {
     out.push_str(&picture_view::key([
         (SightKind::Used, "ends that were used"),
         (SightKind::LeftOut, "left out, point at it for the reason"),
-        (SightKind::Extra, "where a line was not found"),
+        (SightKind::Extra, "not found: where it would be without delays"),
     ]));
     out.push_str("<div class=photos>");
     for (caption, view) in views {

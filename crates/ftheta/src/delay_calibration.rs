@@ -129,8 +129,12 @@ impl DelayCalibration {
             let left = end.left_mm.map_or(String::new(), |mm| format!(", {:.1} µm off", mm * 1e3));
             let why = end.reject.map_or(left, |reject| format!(": {}", reject.reason()));
             let label = format!("{which} of {} at {} mm/s{why}", line.id, line.speed_mm_s);
-            let kind = if end.reject.is_some() { SightKind::LeftOut } else { SightKind::Used };
-            Some(Sight { kind, places: vec![end.pixel?], label })
+            let (kind, place) = match (end.pixel, end.reject) {
+                (Some(pixel), None) => (SightKind::Used, pixel),
+                (Some(pixel), Some(_)) => (SightKind::LeftOut, pixel),
+                (None, _) => (SightKind::Extra, end.nominal?),
+            };
+            Some(Sight { kind, places: vec![place], label })
         })
         .collect()
     }

@@ -10,7 +10,7 @@ use super::growth::{Growth, SpeedWidth, USUAL_WIDTH, seen_growth};
 use super::layout::Layout;
 use super::measured::Reject;
 use super::regression::LineEnd;
-use super::{Delays, Line, LineEndSeen, Method, Observed, SceneFacts};
+use super::{Delays, Line, LineEndSeen, Method, Observed, SceneFacts, nominal};
 use ftheta_model::picture::Picture;
 
 /// What the growth is uncertain by, as a part of the width: with a spot from a data sheet, without,
@@ -106,6 +106,7 @@ fn lines(observed: &Observed, layout: &Layout, ends: &[LineEnd]) -> Vec<Line> {
             let end = ends.iter().find(|end| end.row == index && end.on == on);
             LineEndSeen {
                 pixel: line.ends[usize::from(!on)].ok().map(|end| end.pixel),
+                nominal: nominal(&observed.view, row, usize::from(!on)),
                 off_mm: end.map(|end| end.sense * end.off_mm),
                 left_mm: None,
                 reject: None,
