@@ -73,12 +73,13 @@ fn object(
     let delays = &found.delays;
     let [on_sd, off_sd, mean_sd] = delays.sd_s.map(|s| s * 1e6);
     let scene = &delays.scene;
+    let comb = delays.method == Method::Comb;
     let rejected = found.rejects().into_iter();
     let rejected: Vec<Value> =
         rejected.map(|(id, end, why)| json!({"id": id, "end": end, "why": why})).collect();
     json!({
         "machine": machine,
-        "method": if delays.method == Method::Comb { "comb" } else { "rectangle" },
+        "method": if comb { "comb" } else { "rectangle" },
         "tau_on_us": delays.tau_on_s * 1e6,
         "tau_off_us": delays.tau_off_s * 1e6,
         "tau_on_sd_us": on_sd,
@@ -98,7 +99,7 @@ fn object(
         })),
         "lines": delays.lines.len(),
         "rejected": rejected,
-        "rms_um": delays.rms_mm * 1e3,
+        "rms_um": comb.then_some(delays.rms_mm * 1e3),
         "picture": {
             "um_per_px": scene.mm_per_px * 1e3,
             "blur_px": scene.blur_px,
@@ -133,12 +134,12 @@ fn print(found: &DelayCalibration, left: LaserDelays, files: &[(&str, String)]) 
         say!("left     on {:.2} µs, off {:.2} µs with --apply mirrors", left.on_us, left.off_us);
     }
     let n_rejected = found.rejects().len();
-    say!(
-        "lines    {} at {:.1} µm/px, {n_rejected} ends left out, {:.1} µm rms",
-        delays.lines.len(),
-        delays.scene.mm_per_px * 1e3,
-        delays.rms_mm * 1e3
-    );
+    let (n_lines, um_per_px) = (delays.lines.len(), delays.scene.mm_per_px * 1e3);
+    let rms = match delays.method {
+        Method::Comb => format!(", {:.1} µm rms", delays.rms_mm * 1e3),
+        Method::Rectangle => String::new(),
+    };
+    say!("lines    {n_lines} at {um_per_px:.1} µm/px, {n_rejected} ends left out{rms}");
     for advice in &found.advice {
         say!("next     {advice}");
     }
