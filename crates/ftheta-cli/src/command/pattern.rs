@@ -112,12 +112,11 @@ fn write_sheet(sheet: &Sheet, out: &Path, as_json: bool) -> Result<(), Error> {
         }));
         return Ok(());
     }
-    say!(
-        "pattern  {}, {} mm, {} places to measure",
-        pattern.kind,
-        pattern.field_mm,
-        sheet.places.len()
-    );
+    let what = match sheet.places.len() {
+        0 => format!("{} lines to photograph", pattern.features.len()),
+        n_places => format!("{n_places} places to measure"),
+    };
+    say!("pattern  {}, {:.1} mm, {what}", pattern.kind, pattern.field_mm);
     if let Some(printed) = &sheet.printed {
         let (paper, line_mm) = (printed.paper, printed.line_mm);
         say!("sheet    print it on {paper} at 100 %, and measure both lines of {line_mm} mm");

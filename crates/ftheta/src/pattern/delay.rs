@@ -126,6 +126,8 @@ pub fn sheet(options: &DelayOptions, machine: &Machine) -> Result<Sheet, Pattern
     let all = labels.iter().map(|(_, path)| (turn * path.clone()).bounding_box()).chain(drawn);
     let bounds = all.reduce(|a, b| a.union(b)).unwrap_or(Rect::ZERO);
     let reach_mm = 2.0 * bounds.abs().x1.max(-bounds.x0).max(bounds.y1).max(-bounds.y0);
+    // Whole micrometres, since it is read by people.
+    let reach_mm = (reach_mm * 1e3).ceil() * 1e-3;
     let limit_mm = machine.optics.field_mm;
     if reach_mm > limit_mm {
         return Err(PatternError::DelayField { reach_mm, limit_mm });
