@@ -8,7 +8,7 @@ use ftheta::model::warning::Warning;
 use ftheta::physics::audit::Limits;
 use ftheta::physics::plan::Plan;
 use ftheta::planner::classic::Settings;
-use ftheta::report::score::Score;
+use ftheta::report::score::{RatioSpread, Score};
 use serde_json::{Value, json};
 
 /// Prints the one object of a command.
@@ -135,10 +135,8 @@ pub fn limits(limits: &Limits) -> Value {
 
 fn twin(score: &Score) -> Value {
     let contour = &score.contour_error_um;
-    let dose = score
-        .dose_ratio
-        .map(|dose| json!({"min": dose.min, "p01": dose.p01, "p99": dose.p99, "max": dose.max}));
-    json!({
+    let spread = |ratios: RatioSpread| json!({"min": ratios.min, "p01": ratios.p01, "p99": ratios.p99, "max": ratios.max});
+    let mut figures = json!({
         "duration_s": score.duration_s,
         "contour_error_um": {"max": contour.max, "p99": contour.p99, "rms": contour.rms},
         "coverage_error_um": {
@@ -146,10 +144,14 @@ fn twin(score: &Score) -> Value {
             "p99": score.coverage_error_um.p99,
         },
         "end_error_um": {"max": score.end_error_um.max, "p99": score.end_error_um.p99},
-        "dose_ratio": dose,
+        "dose_ratio": score.dose_ratio.map(spread),
         "stray_energy_ratio": score.stray_energy_ratio,
         "energy_j": score.energy_j,
-    })
+    });
+    if let Some(ratios) = score.pulse_spacing_ratio {
+        figures["pulse_spacing_ratio"] = spread(ratios);
+    }
+    figures
 }
 
 /// Files that were written: kind and path.

@@ -35,6 +35,8 @@ pub fn read(file: &str, text: &str) -> Result<Machine, TomlError> {
     })
 }
 
+/// Fastest triggered pulses, kHz: a hundred a tick of 10 µs.
+const PULSE_KHZ_MAX: f64 = 1e4;
 const DEFAULT_OUTPUT: Output = Output {
     period_ns: 10_000,
     word_bits: 20,
@@ -187,6 +189,12 @@ fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
     let timing = |key| Ok(nanoseconds(section.number(key, -1e4..=1e4)?.unwrap_or(0.0)));
     let mirror_delay_ns = timing("mirror_delay_us")?;
     let spot_um = section.number("spot_diameter_um", 0.5..=1e4)?;
+    let pulse_khz = section.number("pulse_khz", 0.001..=1e6)?;
+    let pulses = [("free", false), ("triggered", true)];
+    let pulses_triggered = section.choice("pulses", &pulses)?.unwrap_or(false);
+    if pulses_triggered && pulse_khz.is_none_or(|khz| khz > PULSE_KHZ_MAX) {
+        return Err(section.refuse("pulses", "free, without a pulse_khz of 10000 or less"));
+    }
     Ok(Laser {
         wavelength_nm,
         beam_quality_m2,
@@ -198,7 +206,8 @@ fn laser(section: &Section<'_>, optics: &Optics) -> Result<Laser, TomlError> {
         mirror_delay_ns,
         minimum_on_ns: nanoseconds(section.number("minimum_on_us", 0.0..=1e5)?.unwrap_or(0.0)),
         power_modulated: section.boolean("power_modulated")?.unwrap_or(true),
-        pulse_khz: section.number("pulse_khz", 0.001..=1e6)?,
+        pulse_khz,
+        pulses_triggered,
     })
 }
 

@@ -15,6 +15,9 @@ pub struct Block {
     /// Laser edges whose time lies within this block, in order; those whose light leads its signal
     /// come with the block in which the light does.
     pub edges: Vec<LaserEdge>,
+    /// Signals that ask for one pulse each, ns from the plan's first sample, in order; empty where
+    /// pulses run free. They come with the block of their light, as edges do.
+    pub triggers_ns: Vec<u64>,
 }
 
 /// A voltage with the state that the axis should be in: the driver adds what its servo makes of the

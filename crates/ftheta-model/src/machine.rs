@@ -192,6 +192,9 @@ pub struct Laser {
     pub power_modulated: bool,
     /// Pulse rate, kHz; `None` is a continuous source.
     pub pulse_khz: Option<f64>,
+    /// Whether every pulse waits for its trigger, so that pulses keep their distance where the beam
+    /// is slower; else pulses run free at their rate. Only of a pulsed source.
+    pub pulses_triggered: bool,
 }
 
 /// What the controller sends.
@@ -222,6 +225,18 @@ impl Scanner {
     /// Inertia of rotor and mirror together, kg·m².
     pub fn inertia_kg_m2(&self) -> f64 {
         self.rotor_inertia_kg_m2 + self.mirror_inertia_kg_m2
+    }
+}
+
+impl Laser {
+    /// Whether the dose can follow the speed of the beam, by power or by the distance of pulses.
+    pub fn follows_speed(&self) -> bool {
+        self.power_modulated || self.pulses_triggered
+    }
+
+    /// Time between pulses at the full rate, s; `None` of a continuous source.
+    pub fn pulse_period_s(&self) -> Option<f64> {
+        self.pulse_khz.map(|khz| 1e-3 / khz)
     }
 }
 

@@ -13,6 +13,8 @@ pub struct Trace {
     pub points: Vec<TracePoint>,
     /// Light that ended, or was cut at the end of the stretch, in order.
     pub light: Vec<Light>,
+    /// Pulses of a pulsed laser, in order; a continuous one has none.
+    pub pulses: Vec<Pulse>,
     /// One state per tick of the axes, for curves; thinned by the twin.
     pub states: Vec<AxisStates>,
 }
@@ -35,8 +37,19 @@ pub struct Light {
     pub on_ns: u64,
     /// Last light, ns from the first sample.
     pub off_ns: u64,
-    /// Power, W.
+    /// Power, W. Of pulses the mean: each counts half before and half after itself.
     pub power_w: f64,
+}
+
+/// A pulse of light, short beside the motion of the beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pulse {
+    /// The interval of [`Light`] that it belongs to.
+    pub index: usize,
+    /// When, ns from the first sample.
+    pub time_ns: u64,
+    /// Its energy, J.
+    pub energy_j: f64,
 }
 
 /// What the two axes were doing at one moment.

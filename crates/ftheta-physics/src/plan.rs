@@ -227,6 +227,10 @@ impl Feed {
         ] {
             self.number(value);
         }
+        // Other machines keep the ids that they had before there were triggers.
+        if laser.pulses_triggered {
+            self.text("triggered");
+        }
         self.text(&format!("{:?}", optics.first_mirror));
         match &optics.lens {
             Lens::FTheta { coefficients_mm } => {
@@ -251,7 +255,11 @@ impl Feed {
             .iter()
             .for_each(|&value| self.number(value));
         }
-        match scanner.servo {
+        self.servo(scanner.servo);
+    }
+
+    fn servo(&mut self, servo: Servo) {
+        match servo {
             Servo::StateFeedback { velocity_weight_s, lag_s } => {
                 self.number(velocity_weight_s);
                 self.number(lag_s);

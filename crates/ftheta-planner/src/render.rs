@@ -1,6 +1,7 @@
 //! Renders a plan into blocks of output words: the only place where millimetres become codes.
 
 mod axes;
+mod pulses;
 pub(crate) mod track;
 mod words;
 
@@ -12,6 +13,7 @@ use ftheta_model::space::DacCodes;
 use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::plan::Plan;
 use kurbo::{Point, Vec2};
+use pulses::Triggers;
 use track::Track;
 use words::Words;
 
@@ -36,6 +38,7 @@ pub struct Renderer<'a> {
     /// Laser edges already given: the mark they belong to, and how many of it.
     mark_index: usize,
     n_edges: usize,
+    triggers: Triggers,
 }
 
 /// The state of a walk along a path.
@@ -68,6 +71,7 @@ impl<'a> Renderer<'a> {
             next_index: 0,
             mark_index: 0,
             n_edges: 0,
+            triggers: Triggers::new(&plan.machine.laser),
         };
         renderer.enter();
         renderer
@@ -104,6 +108,7 @@ impl<'a> Renderer<'a> {
         block.first_index = self.next_index;
         block.words.clear();
         block.edges.clear();
+        block.triggers_ns.clear();
         while block.words.len() < BLOCK_SAMPLES {
             let Some(segment) = self.plan.segments.get(self.segment_index) else {
                 break;
@@ -207,9 +212,13 @@ impl<'a> Renderer<'a> {
         let leads_ns =
             [laser.on_latency_ns, laser.off_latency_ns].map(|ns| ns.min(0).unsigned_abs());
         while let Some(mark) = self.plan.marks.get(self.mark_index) {
+            // Pulses that wait for triggers have the pen's energy, each of them.
+            let steps = if laser.pulses_triggered { &[] } else { &mark.steps[..] };
             let edge = if self.n_edges == 0 {
-                LaserEdge { time_ns: mark.on_ns, power_w: mark.power_w }
-            } else if let Some(&step) = mark.steps.get(self.n_edges - 1) {
+                let pen_w = self.plan.pens[mark.pen_index].power_w;
+                let power_w = if laser.pulses_triggered { pen_w } else { mark.power_w };
+                LaserEdge { time_ns: mark.on_ns, power_w }
+            } else if let Some(&step) = steps.get(self.n_edges - 1) {
                 step
             } else {
                 LaserEdge { time_ns: mark.off_ns, power_w: 0.0 }
@@ -220,10 +229,11 @@ impl<'a> Renderer<'a> {
                 break;
             }
             block.edges.push(edge);
-            let last = self.n_edges == mark.steps.len() + 1;
+            let last = self.n_edges == steps.len() + 1;
             self.mark_index += usize::from(last);
             self.n_edges = if last { 0 } else { self.n_edges + 1 };
         }
+        self.triggers.push_before(self.plan, end_ns + leads_ns[0], &mut block.triggers_ns);
     }
 }
 

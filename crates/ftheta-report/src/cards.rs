@@ -74,12 +74,16 @@ pub fn draw(out: &mut String, cards: [Card; 5]) {
 
 fn dose_card(score: &Score) -> Card {
     let percent = |ratio: f64| format!("{:.0}", 100.0 * ratio);
+    let pulses = score
+        .pulse_spacing_ratio
+        .map(|pulses| format!("; pulses {}–{} % apart", percent(pulses.p01), percent(pulses.p99)));
+    let pulses = pulses.unwrap_or_default();
     let (value, more) = match score.dose_ratio {
         Some(dose) => (
             format!("{}–{} %", percent(dose.p01), percent(dose.p99)),
-            format!("extremes {} and {} %", percent(dose.min), percent(dose.max)),
+            format!("extremes {} and {} %{pulses}", percent(dose.min), percent(dose.max)),
         ),
-        None => ("–".into(), "marks shorter than the window".into()),
+        None => ("–".into(), format!("marks shorter than the window{pulses}")),
     };
     Card { name: "Dose, 1 to 99 %", value, more, good: None }
 }

@@ -19,7 +19,7 @@ pub struct Rival<'a> {
 type Figure = fn(&Score) -> Option<f64>;
 
 /// What is compared, with its unit.
-const ROWS: [(&str, Figure); 9] = [
+const ROWS: [(&str, Figure); 11] = [
     ("Marking time, ms", |score| Some(1e3 * score.duration_s)),
     ("Contour error, max, µm", |score| Some(score.contour_error_um.max)),
     ("Contour error, rms, µm", |score| Some(score.contour_error_um.rms)),
@@ -27,6 +27,8 @@ const ROWS: [(&str, Figure); 9] = [
     ("End error, max, µm", |score| Some(score.end_error_um.max)),
     ("Dose, 1 % of all places, %", |score| Some(100.0 * score.dose_ratio?.p01)),
     ("Dose, 99 % of all places, %", |score| Some(100.0 * score.dose_ratio?.p99)),
+    ("Distance of pulses, 1 %, %", |score| Some(100.0 * score.pulse_spacing_ratio?.p01)),
+    ("Distance of pulses, 99 %, %", |score| Some(100.0 * score.pulse_spacing_ratio?.p99)),
     ("Energy off the marks, %", |score| Some(100.0 * score.stray_energy_ratio)),
     ("Light, J", |score| Some(score.energy_j)),
 ];
@@ -54,7 +56,12 @@ pub(crate) fn comparison(out: &mut String, input: &ReportInput<'_>) {
     let scores = || rivals.iter().map(|rival| rival.score);
     for (name, value) in ROWS {
         let own = value(input.score);
-        row(out, name, std::iter::once(own).chain(scores().map(|score| value(score?))));
+        let values: Vec<_> =
+            std::iter::once(own).chain(scores().map(|score| value(score?))).collect();
+        // A continuous laser has no pulses.
+        if values.iter().any(Option::is_some) {
+            row(out, name, values.into_iter());
+        }
     }
     let own_s = input.score.duration_s;
     let ratios = scores().map(|score| Some(score?.duration_s / own_s));

@@ -27,7 +27,10 @@ pub struct Score {
     /// Magnitude of what light is too long or too short along the curve, over both ends.
     pub end_error_um: Tail,
     /// Line energy over what the pen asks for; `None` where every mark is shorter than the window.
-    pub dose_ratio: Option<DoseRatio>,
+    pub dose_ratio: Option<RatioSpread>,
+    /// Way of the beam between neighbouring pulses of an interval, over pen speed by pulse rate;
+    /// `None` where there are no two pulses.
+    pub pulse_spacing_ratio: Option<RatioSpread>,
     /// Energy emitted off the marks over all energy.
     pub stray_energy_ratio: f64,
     /// First light to last light, s.
@@ -64,9 +67,9 @@ pub struct Tail {
     pub p99: f64,
 }
 
-/// Both ends of the distribution of the dose, as ratios.
+/// Both ends of a distribution of ratios.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DoseRatio {
+pub struct RatioSpread {
     /// Smallest.
     pub min: f64,
     /// Not exceeded by 1 %.
@@ -119,6 +122,18 @@ pub struct Scorer<'a> {
     waiting: VecDeque<Light>,
     /// The last point of the stretch before.
     last: Option<TracePoint>,
+    last_pulse: Option<LastPulse>,
+}
+
+/// The last pulse, and how far the beam has gone since.
+#[derive(Clone, Copy)]
+struct LastPulse {
+    /// Interval of light that it belongs to.
+    index: usize,
+    /// Time and place up to which the way is known.
+    at_ns: u64,
+    beam: Point,
+    way_mm: f64,
 }
 
 /// Where the beam is in a stretch and just before it.
@@ -137,6 +152,7 @@ impl<'a> Scorer<'a> {
             next_mark: 0,
             waiting: VecDeque::new(),
             last: None,
+            last_pulse: None,
         }
     }
 
@@ -151,6 +167,7 @@ impl<'a> Scorer<'a> {
             return;
         };
         let end_ns = (end - 1) * trace.step_ns;
+        self.take_pulses(trace, end_ns);
         while let Some(light) = self.waiting.pop_front() {
             if light.on_ns < end_ns || light.off_ns <= end_ns {
                 let off_ns = light.off_ns.min(end_ns);
@@ -204,6 +221,31 @@ impl<'a> Scorer<'a> {
         }
     }
 
+    /// Measures the pulses' distances.
+    ///
+    /// * `end_ns`: time of the stretch's last point
+    fn take_pulses(&mut self, trace: &Trace, end_ns: u64) {
+        let beam = BeamAt { trace, last: self.last };
+        for pulse in &trace.pulses {
+            let before = self.last_pulse.filter(|last| last.index == pulse.index);
+            let pen = self.plan.marks.get(pulse.index).map(|mark| &self.plan.pens[mark.pen_index]);
+            if let (Some(mut last), Some(pen)) = (before, pen)
+                && let Some(period_s) = self.plan.machine.laser.pulse_period_s()
+            {
+                last.go_on(&beam, pulse.time_ns);
+                self.tally.take_pulse_spacing(last.way_mm / (pen.mark_speed_mm_s * period_s));
+            }
+            let (index, at_ns) = (pulse.index, pulse.time_ns);
+            self.last_pulse = Some(LastPulse { index, at_ns, beam: beam.at(at_ns), way_mm: 0.0 });
+        }
+        // The interval may go on in the next stretch.
+        if let (Some(last), Some(light)) = (&mut self.last_pulse, trace.light.last())
+            && last.index == light.index
+        {
+            last.go_on(&beam, end_ns);
+        }
+    }
+
     fn end_marks_before(&mut self, index: usize) {
         if let Some(track) = self.track.take_if(|track| track.mark_index < index) {
             self.next_mark = track.mark_index + 1;
@@ -215,6 +257,19 @@ impl<'a> Scorer<'a> {
             self.tally.miss_mark(length_mm);
         }
         self.next_mark = self.next_mark.max(end);
+    }
+}
+
+impl LastPulse {
+    /// Follows the beam up to a later time.
+    fn go_on(&mut self, beam: &BeamAt<'_>, until_ns: u64) {
+        let step_ns = beam.trace.step_ns;
+        while self.at_ns < until_ns {
+            self.at_ns = (self.at_ns / step_ns + 1).saturating_mul(step_ns).min(until_ns);
+            let next = beam.at(self.at_ns);
+            self.way_mm += self.beam.distance(next);
+            self.beam = next;
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Sums over all marks, from which the figures come.
 
 use crate::histogram::Histogram;
-use crate::score::{ContourError, DoseRatio, ErrorSample, MarkError, Score, Tail};
+use crate::score::{ContourError, ErrorSample, MarkError, RatioSpread, Score, Tail};
 use crate::track::MarkTrack;
 use ftheta_model::trace::Light;
 use kurbo::Point;
@@ -35,6 +35,7 @@ pub struct Tally {
     coverage_um: Histogram,
     end_um: Histogram,
     dose: Histogram,
+    pulse_spacing: Histogram,
     dose_bars: Vec<f64>,
     stray_j: f64,
     energy_j: f64,
@@ -65,6 +66,7 @@ impl Tally {
             coverage_um: Histogram::of_errors_um(),
             end_um: Histogram::of_errors_um(),
             dose: Histogram::new(1e-4, 1e4, 10),
+            pulse_spacing: Histogram::new(1e-4, 1e4, 10),
             dose_bars: vec![0.0; N_DOSE_BARS],
             stray_j: 0.0,
             energy_j: 0.0,
@@ -94,6 +96,11 @@ impl Tally {
     /// Counts energy that belongs to no mark, J.
     pub fn take_stray(&mut self, energy_j: f64) {
         self.stray_j += energy_j;
+    }
+
+    /// Counts the distance of two pulses, over what the pen asks for.
+    pub fn take_pulse_spacing(&mut self, ratio: f64) {
+        self.pulse_spacing.add(ratio, 1.0);
     }
 
     /// Counts a mark that saw no light.
@@ -161,12 +168,6 @@ impl Tally {
         let tail =
             |histogram: &Histogram| Tail { max: histogram.max(), p99: histogram.percentile(0.99) };
         let n_windows = self.dose.total();
-        let dose_ratio = (n_windows > 0.0).then(|| DoseRatio {
-            min: self.dose.min(),
-            p01: self.dose.percentile(0.01),
-            p99: self.dose.percentile(0.99),
-            max: self.dose.max(),
-        });
         self.dose_bars.iter_mut().for_each(|bar| *bar /= n_windows.max(1.0));
         let (on_ns, off_ns) = self.light_ns.unwrap_or_default();
         Score {
@@ -180,7 +181,8 @@ impl Tally {
             },
             coverage_error_um: tail(&self.coverage_um),
             end_error_um: tail(&self.end_um),
-            dose_ratio,
+            dose_ratio: spread(&self.dose),
+            pulse_spacing_ratio: spread(&self.pulse_spacing),
             stray_energy_ratio: match self.energy_j > 0.0 {
                 true => self.stray_j / self.energy_j,
                 false => 0.0,
@@ -229,6 +231,16 @@ impl ErrorMap {
         self.samples.extend(self.group.take());
         self.samples
     }
+}
+
+/// Both ends of what was counted, if anything was.
+fn spread(ratios: &Histogram) -> Option<RatioSpread> {
+    (ratios.total() > 0.0).then(|| RatioSpread {
+        min: ratios.min(),
+        p01: ratios.percentile(0.01),
+        p99: ratios.percentile(0.99),
+        max: ratios.max(),
+    })
 }
 
 fn worse(found: Option<ErrorSample>, next: ErrorSample) -> Option<ErrorSample> {

@@ -263,6 +263,6 @@ fn chunk(whole: &Trace, first: usize, points: &[TracePoint]) -> Trace {
         first_index: first as u64,
         points: points.to_vec(),
         light: light.collect(),
-        states: Vec::new(),
+        ..Trace::default()
     }
 }

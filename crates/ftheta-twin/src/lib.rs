@@ -10,4 +10,5 @@ mod light;
 pub mod mismatch;
 pub mod open_loop;
 pub mod photograph;
+mod pulses;
 pub mod twin;

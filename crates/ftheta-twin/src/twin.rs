@@ -4,11 +4,12 @@ use crate::beam::{Beam, Command};
 use crate::exposure::Exposure;
 use crate::light::LaserState;
 use crate::mismatch::Mismatch;
+use crate::pulses::{Pulses, Until};
 use ftheta_model::block::{Block, SampleSink, VoltageSample};
 use ftheta_model::dose::DoseMap;
 use ftheta_model::machine::Machine;
 use ftheta_model::space::{DacCodes, FieldPoint};
-use ftheta_model::trace::{Trace, TracePoint};
+use ftheta_model::trace::{Pulse, Trace, TracePoint};
 use ftheta_physics::head::{Head, Tracer};
 use ftheta_physics::servo::ServoError;
 use std::collections::VecDeque;
@@ -46,6 +47,7 @@ pub enum TwinError {
 pub struct Twin {
     beam: Beam,
     laser: LaserState,
+    pulses: Pulses,
     exposure: Exposure,
     trace: Trace,
     last: FieldPoint,
@@ -78,10 +80,12 @@ impl Twin {
         let latencies_ns =
             [machine.laser.on_latency_ns + on_ns, machine.laser.off_latency_ns + off_ns];
         let lead_ns = latencies_ns.map(|ns| ns.min(0).unsigned_abs()).into_iter().fold(0, u64::max);
-        let trace = Trace { step_ns: period_ns / beam.n_substeps() as u64, ..Trace::default() };
+        let step_ns = period_ns / beam.n_substeps() as u64;
+        let trace = Trace { step_ns, ..Trace::default() };
         Ok(Self {
             beam,
             laser: LaserState::new(latencies_ns[0], latencies_ns[1]),
+            pulses: Pulses::new(&machine.laser, latencies_ns[0], step_ns),
             exposure: Exposure::new(options.pixel_mm),
             trace: Trace { points: vec![TracePoint::default()], ..trace },
             last: FieldPoint::default(),
@@ -115,7 +119,8 @@ impl Twin {
     /// the stretch before; light that goes on is cut at the end of the stretch.
     pub fn take_trace(&mut self) -> Trace {
         let now_ns = self.next_index * self.period_ns;
-        self.trace.light.extend(self.laser.cut(now_ns));
+        let cut = self.laser.cut(now_ns).map(|light| self.pulses.spread(light, Until::Cut));
+        self.trace.light.extend(cut);
         let last_point = self.trace.points[self.trace.points.len() - 1];
         let next = Trace {
             step_ns: self.trace.step_ns,
@@ -161,24 +166,41 @@ impl Twin {
     /// Spreads energy over a sub-step in which light may change.
     fn expose(&mut self, from_ns: u64, from: FieldPoint, to: FieldPoint) {
         let end_ns = from_ns + self.trace.step_ns;
+        let place = |time_ns: f64| {
+            let share = (time_ns - from_ns as f64) / self.trace.step_ns as f64;
+            FieldPoint::new(
+                from.x_mm + share * (to.x_mm - from.x_mm),
+                from.y_mm + share * (to.y_mm - from.y_mm),
+            )
+        };
         let mut now_ns = from_ns;
+        self.pulses.skip_to(from_ns);
         loop {
-            let until_ns = self.laser.next_ns().min(end_ns);
+            let pulse_ns = self.pulses.next_ns();
+            let until_ns = self.laser.next_ns().min(pulse_ns).min(end_ns);
             let power_w = self.laser.power_w();
-            if power_w > 0.0 && until_ns > now_ns {
-                let middle_ns = 0.5 * (now_ns + until_ns) as f64 - from_ns as f64;
-                let share = middle_ns / self.trace.step_ns as f64;
-                let place = FieldPoint::new(
-                    from.x_mm + share * (to.x_mm - from.x_mm),
-                    from.y_mm + share * (to.y_mm - from.y_mm),
-                );
-                self.exposure.add(place, power_w * (until_ns - now_ns) as f64 * 1e-9);
+            if power_w > 0.0 && until_ns > now_ns && !self.pulses.are_seen() {
+                let middle = place(0.5 * (now_ns + until_ns) as f64);
+                self.exposure.add(middle, power_w * (until_ns - now_ns) as f64 * 1e-9);
             }
             if until_ns == end_ns {
                 return;
             }
             now_ns = until_ns.max(now_ns);
-            self.trace.light.extend(self.laser.change());
+            if self.laser.next_ns() <= now_ns {
+                let ended = self.laser.change();
+                let until = if self.laser.power_w() > 0.0 { Until::Cut } else { Until::Off };
+                let ended = ended.map(|light| self.pulses.spread(light, until));
+                self.trace.light.extend(ended);
+            } else {
+                let energy_j = self.pulses.fire(power_w);
+                if let Some(light) = self.laser.cut(now_ns) {
+                    self.exposure.add(place(now_ns as f64), energy_j);
+                    let pulse = Pulse { index: light.index, time_ns: now_ns, energy_j };
+                    self.trace.pulses.push(pulse);
+                    self.trace.light.push(self.pulses.spread(light, Until::Pulse(energy_j)));
+                }
+            }
         }
     }
 }
@@ -192,6 +214,7 @@ impl SampleSink for Twin {
             return Err(TwinError::Gap { found: block.first_index, expected });
         }
         block.edges.iter().for_each(|&edge| self.laser.take(edge));
+        block.triggers_ns.iter().for_each(|&time_ns| self.pulses.take(time_ns));
         for (index, &word) in block.words.iter().enumerate() {
             self.held.push_back(Tick { word, volts: block.volts.get(index).copied() });
             if self.held.len() > self.n_held

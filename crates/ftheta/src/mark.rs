@@ -246,7 +246,7 @@ fn broken(plan: &PlanDraft, promise: &Promise) -> Option<Warning> {
 /// Marks that never reach their pen's speed, pen by pen; with a laser that is only on or off all
 /// that are slower anywhere, since their dose is not what the pen says.
 fn slower_marks(plan: &PlanDraft) -> Vec<Warning> {
-    let modulated = plan.machine.laser.power_modulated;
+    let modulated = plan.machine.laser.follows_speed();
     // Per pen: how many, the slowest of them and its speed.
     let mut slower: Vec<(usize, usize, f64)> = vec![(0, 0, f64::INFINITY); plan.pens.len()];
     let mut speeds: Vec<Option<f64>> = vec![None; plan.marks.len()];

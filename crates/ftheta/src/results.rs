@@ -104,7 +104,8 @@ fn settings_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
         ("Output word", format!("{} bit", machine.output.word_bits)),
     ];
     if let Some(pulse_khz) = laser.pulse_khz {
-        rows.insert(1, ("Pulse rate", format!("{pulse_khz} kHz")));
+        let way = if laser.pulses_triggered { "one for each trigger" } else { "free" };
+        rows.insert(1, ("Pulses", format!("{pulse_khz} kHz, {way}")));
     }
     if let Some(table) = &about.options.table {
         let (n, about) = (table.planes()[0].angles.n_nodes(), table.about());

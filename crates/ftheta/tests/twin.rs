@@ -26,7 +26,7 @@ fn twin(machine: &Machine, mismatch: Mismatch) -> Twin {
 /// A step of both axes, long enough to settle.
 fn step_block(n_samples: usize, word: i32) -> Block {
     let words = vec![DacCodes { x: word, y: -word / 2 }; n_samples];
-    Block { first_index: 0, words, volts: Vec::new(), edges: Vec::new() }
+    Block { words, ..Block::default() }
 }
 
 #[test]

@@ -174,6 +174,14 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
             score.stray_energy_ratio * 100.0
         );
     }
+    if let Some(pulses) = score.pulse_spacing_ratio {
+        say!(
+            "pulses   {:.3} to {:.3} of their pitch apart (p1 to p99), {:.3} at least",
+            pulses.p01,
+            pulses.p99,
+            pulses.min
+        );
+    }
     for (kind, path) in files {
         say!("{kind:8} {path}");
     }

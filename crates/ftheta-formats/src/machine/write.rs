@@ -125,6 +125,7 @@ fn laser(machine: &Machine, out: &mut String) {
     let _ = writeln!(out, "power_modulated = {}", laser.power_modulated);
     if let Some(pulse_khz) = laser.pulse_khz {
         scaled(out, "pulse_khz", pulse_khz, 1.0);
+        text(out, "pulses", if laser.pulses_triggered { "triggered" } else { "free" });
     }
 }
 

@@ -143,7 +143,7 @@ impl<'a> Beam<'a> {
 
     fn check_dose(&self, mark: &PlannedMark, at_mm: f64) -> Result<(), AuditError> {
         let pen = &self.draft.pens[mark.pen_index];
-        if !self.draft.machine.laser.power_modulated || pen.power_w == 0.0 {
+        if !self.draft.machine.laser.follows_speed() || pen.power_w == 0.0 {
             return Ok(());
         }
         let spot_mm = self.draft.machine.laser.spot_diameter_mm;

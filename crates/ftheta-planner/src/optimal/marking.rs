@@ -112,7 +112,7 @@ impl Marking<'_> {
         let limits = self.limits(&pen, &path);
         let sky = match self.options.corner {
             Corner::Sky => true,
-            Corner::Auto => !self.weave.machine.laser.power_modulated,
+            Corner::Auto => !self.weave.machine.laser.follows_speed(),
             Corner::Exact | Corner::Blend => false,
         };
         if sky {
@@ -199,10 +199,12 @@ impl Marking<'_> {
             }
         }
         let laser = &self.weave.machine.laser;
-        let powers = match laser.power_modulated && !stroke.is_steady(pen) {
+        // Triggered pulses can come no faster than at the rate that the pen's power stands for.
+        let power_max_w = if laser.pulses_triggered { pen.power_w } else { laser.power_max_w };
+        let powers = match laser.follows_speed() && !stroke.is_steady(pen) {
             true => {
                 let times_s = (start_s, self.weave.period_s());
-                powers(pen, laser.power_max_w, &progress_mm, times_s)
+                powers(pen, power_max_w, &progress_mm, times_s)
             }
             false => Powers::new(),
         };

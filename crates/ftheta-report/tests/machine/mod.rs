@@ -47,6 +47,7 @@ pub fn machine() -> Machine {
             minimum_on_ns: 0,
             power_modulated: true,
             pulse_khz: None,
+            pulses_triggered: false,
         },
         output: Output {
             period_ns: 10_000,

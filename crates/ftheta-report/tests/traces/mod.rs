@@ -52,7 +52,7 @@ pub fn trace(light_ns: &[(u64, u64)], beam: impl Fn(f64) -> Point) -> Trace {
         light: light
             .map(|(index, &(on_ns, off_ns))| Light { index, on_ns, off_ns, power_w: 10.0 })
             .collect(),
-        states: Vec::new(),
+        ..Trace::default()
     }
 }
 

@@ -63,10 +63,10 @@ pub(super) fn playback(
     let block = Block {
         first_index: 0,
         words: (0..n_samples).map(|sample| words[at(sample)]).collect(),
-        volts: Vec::new(),
         edges: edges(&points, &machine.laser, rate, lag_s)
             .map(|(time_ns, lit)| LaserEdge { time_ns, power_w: if lit { power_w } else { 0.0 } })
             .collect(),
+        ..Block::default()
     };
     let twin_options = TwinOptions {
         mismatch: options.mark.mismatch,
