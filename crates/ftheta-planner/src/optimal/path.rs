@@ -28,9 +28,19 @@ pub(super) struct Path {
 }
 
 impl Path {
+    /// No path yet, with room for so many vertices: else a dense one spends its time growing.
+    fn with_room(n_vertices: usize) -> Self {
+        Self {
+            vertices: Vec::with_capacity(n_vertices),
+            stations: Vec::with_capacity(n_vertices),
+            curved: false,
+            curve_at: Vec::with_capacity(n_vertices),
+        }
+    }
+
     /// The path of a mark; `None` if it has no length.
     pub(super) fn new(mark: &Mark) -> Option<Self> {
-        let mut path = Self::default();
+        let mut path = Self::with_room(mark.curve.elements().len());
         for (index, segment) in mark.curve.segments().enumerate() {
             match segment {
                 PathSeg::Line(line) => path.push_line(line, index),
@@ -45,7 +55,7 @@ impl Path {
 
     /// A straight path through points.
     pub(super) fn straight(points: &[Point]) -> Option<Self> {
-        let mut path = Self::default();
+        let mut path = Self::with_room(points.len());
         for (index, pair) in points.windows(2).enumerate() {
             path.push_line(Line::new(pair[0], pair[1]), index);
         }

@@ -90,8 +90,7 @@ impl Track {
         }
         self.next_tick += n_samples as f64;
         for _ in 0..3 {
-            average(x, self.smoothing_ticks);
-            average(y, self.smoothing_ticks);
+            average([&mut *x, &mut *y], self.smoothing_ticks);
         }
         for (x, y) in x.iter_mut().zip(y.iter_mut()) {
             [*x, *y] = words.angles(Point::new(*x, *y));
@@ -140,27 +139,31 @@ fn averaged(plan: &PlanDraft, motion: &Motion, first_tick: f64, n_places: usize)
         .map(|index| cursor.place(plan, (first_tick + index as f64) * tick_s));
     let (mut x, mut y): (Vec<f64>, Vec<f64>) = base.map(|place| (place.x, place.y)).unzip();
     for _ in 0..3 {
-        average(&mut x, n);
-        average(&mut y, n);
+        average([&mut x, &mut y], n);
     }
     x.into_iter().zip(y).map(|(x, y)| Point::new(x, y)).collect()
 }
 
 /// Replaces values by the mean of `n` neighbours each; there are n - 1 fewer of them.
-fn average(values: &mut Vec<f64>, n: usize) {
+///
+/// Both coordinates go side by side, and what enters less what leaves is one sum: the time of this
+/// is that of additions which wait for each other.
+fn average([x, y]: [&mut Vec<f64>; 2], n: usize) {
+    let n_values = x.len().min(y.len());
     if n == 1 {
         return;
     }
     let share = 1.0 / n as f64;
-    let mut sum: f64 = values[..n - 1].iter().sum();
-    let n_means = values.len() + 1 - n;
-    for index in 0..n_means {
-        let (oldest, newest) = (values[index], values[index + n - 1]);
-        sum += newest;
-        values[index] = sum * share;
-        sum -= oldest;
+    let mut sum: [f64; 2] = [x[..n].iter().sum(), y[..n].iter().sum()];
+    let last = n_values - n;
+    for index in 0..last {
+        let change = [x[index + n] - x[index], y[index + n] - y[index]];
+        [x[index], y[index]] = sum.map(|sum| sum * share);
+        sum = [sum[0] + change[0], sum[1] + change[1]];
     }
-    values.truncate(n_means);
+    [x[last], y[last]] = sum.map(|sum| sum * share);
+    x.truncate(last + 1);
+    y.truncate(last + 1);
 }
 
 /// The commands of samples from the angles around them.
@@ -193,15 +196,13 @@ impl TrackCursor {
         let leg = Leg::new(plan, first_station.map(|first| (first, 0)), first_vertex, 0.0);
         let knot = first_knot as usize;
         let last_knot = knot + n_knots as usize - 1;
-        // At constant speed before the first knot.
-        let acceleration_mm_s2 = 0.0;
         Some(Self {
             first_vertex,
             last_vertex,
             first_station,
             last_knot,
             knot,
-            acceleration_mm_s2,
+            acceleration_mm_s2: acceleration_mm_s2(plan, knot, last_knot),
             leg,
         })
     }
@@ -212,6 +213,7 @@ impl TrackCursor {
         self.pass_knots(plan, time_s);
         let Knot { time_s: from_s, distance_mm, speed_mm_s } = plan.knots[self.knot];
         let since_s = time_s - from_s;
+        // At constant speed before the first knot.
         let acceleration_mm_s2 = if since_s < 0.0 { 0.0 } else { self.acceleration_mm_s2 };
         let at_mm = distance_mm + (speed_mm_s + 0.5 * acceleration_mm_s2 * since_s) * since_s;
         if at_mm > self.leg.end_mm {
@@ -239,21 +241,23 @@ impl TrackCursor {
 
     #[inline]
     fn pass_knots(&mut self, plan: &PlanDraft, time_s: f64) {
-        let knots = &plan.knots;
-        if self.knot == self.last_knot {
-            self.acceleration_mm_s2 = 0.0;
-            return;
-        }
-        while self.knot < self.last_knot && knots[self.knot + 1].time_s <= time_s {
+        let before = self.knot;
+        while self.knot < self.last_knot && plan.knots[self.knot + 1].time_s <= time_s {
             self.knot += 1;
         }
-        self.acceleration_mm_s2 = if self.knot < self.last_knot {
-            let (from, to) = (knots[self.knot], knots[self.knot + 1]);
-            (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s)
-        } else {
-            0.0
-        };
+        if self.knot > before {
+            self.acceleration_mm_s2 = acceleration_mm_s2(plan, self.knot, self.last_knot);
+        }
     }
+}
+
+/// Acceleration from a knot on, mm/s²; none after the last one.
+fn acceleration_mm_s2(plan: &PlanDraft, knot: usize, last_knot: usize) -> f64 {
+    if knot == last_knot {
+        return 0.0;
+    }
+    let (from, to) = (plan.knots[knot], plan.knots[knot + 1]);
+    (to.speed_mm_s - from.speed_mm_s) / (to.time_s - from.time_s)
 }
 
 impl Leg {
@@ -281,10 +285,12 @@ impl Leg {
         let Station { leaving: tangent, distance_mm: start_mm, .. } = plan.stations[first + index];
         let Station { arriving: end, distance_mm: end_mm, .. } = plan.stations[first + index + 1];
         let length_mm = end_mm - start_mm;
-        let mean = chord / length_mm;
+        // One division, since short legs are entered at every tick.
+        let per_mm = 1.0 / length_mm;
+        let mean = chord * per_mm;
         // Hermite's cubic in powers of the distance from the start.
-        let bend = (mean * 3.0 - tangent * 2.0 - end) / length_mm;
-        let twist = (tangent + end - mean * 2.0) / (length_mm * length_mm);
+        let bend = (mean * 3.0 - tangent * 2.0 - end) * per_mm;
+        let twist = (tangent + end - mean * 2.0) * (per_mm * per_mm);
         Self { vertex, start_mm, end_mm, from, tangent, bend, twist }
     }
 
