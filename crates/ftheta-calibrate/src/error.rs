@@ -115,6 +115,18 @@ pub enum CalibrateError {
         /// The place, mm.
         y_mm: f64,
     },
+    /// A plane that lies in the head or behind it.
+    #[error("there is no room for a plane at a height of {z_mm} mm below the head")]
+    Room {
+        /// Its height above the nominal work plane, mm.
+        z_mm: f64,
+    },
+    /// A plane for a table that has drifted since.
+    #[error(
+        "the table has a drift, which would be laid over the new plane too: add planes to the \
+         table as it was made, and follow the drift again after it"
+    )]
+    Drifted,
     /// The table made is not usable.
     #[error("{0}")]
     Table(#[from] ftheta_physics::correction::CorrectionError),

@@ -40,6 +40,12 @@ pub enum ExchangeError {
         /// Half its width, mm.
         half_width_mm: f64,
     },
+    /// A table of several planes for a file that has one.
+    #[error("a table of {n_planes} planes does not fit into a file that has one; keep it as .txt")]
+    Planes {
+        /// Planes there are.
+        n_planes: usize,
+    },
     /// The mirrors' range leads beyond the optics.
     #[error("the optics do not reach what the mirrors' greatest angles ask for")]
     Optics,
@@ -54,6 +60,7 @@ impl ExchangeError {
         let place = match self {
             Self::Node { row, column, .. } => format!("row {row}, column {column}"),
             Self::Grid { .. } => "grid".into(),
+            Self::Planes { .. } => "planes".into(),
             Self::Optics => "optics".into(),
             Self::Table(_) => "table".into(),
         };
@@ -74,6 +81,10 @@ pub fn offsets(
     n_side: usize,
     half_width_mm: f64,
 ) -> Result<OffsetGrid, ExchangeError> {
+    let n_planes = table.planes().len();
+    if n_planes > 1 {
+        return Err(ExchangeError::Planes { n_planes });
+    }
     let mm_per_rad = scale_mm_per_rad(&machine.optics);
     let mut grid = OffsetGrid { n_side, half_width_mm, offsets_mm: Vec::new() };
     for index in 0..n_side * n_side {

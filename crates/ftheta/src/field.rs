@@ -241,7 +241,7 @@ fn at(line: u32, what: Unmapped) -> FieldError {
 }
 
 /// The optics with the work plane raised towards the head; `None` where there is no room.
-fn raised(optics: &Optics, z_mm: f64) -> Option<Optics> {
+pub(crate) fn raised(optics: &Optics, z_mm: f64) -> Option<Optics> {
     let mut optics = optics.clone();
     if let Lens::PostObjective { working_distance_mm, .. } = &mut optics.lens {
         *working_distance_mm -= z_mm;

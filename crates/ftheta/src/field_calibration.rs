@@ -2,7 +2,7 @@
 //! the table, and what to do next.
 
 use crate::Error;
-use crate::field::corrected;
+use crate::field::{corrected, raised};
 use crate::field_picture::FieldPicture;
 use ftheta_calibrate::accuracy::{Spread, distance_mm};
 use ftheta_calibrate::calibrate::{CalibrateOptions, Calibration, Model, calibrate};
@@ -13,7 +13,7 @@ use ftheta_model::calibration::MeasuredPoint;
 use ftheta_model::machine::Machine;
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_model::warning::Warning;
-use ftheta_physics::correction::{CorrectionTable, Drift};
+use ftheta_physics::correction::{About, CorrectionPlane, CorrectionTable, Drift};
 use ftheta_physics::optics::{angles_from_field, scale_mm_per_rad};
 use ftheta_report::calibration_report::{
     AxesFound, CalibrationReportInput, ErrorMap, ErrorSummary, ReportParameter, ReportPoint,
@@ -89,20 +89,71 @@ pub fn calibrate_field(
             }
         };
         for (slot, point) in marks.iter_mut().zip(points).filter(|(_, p)| p.round == round) {
-            let command = command(machine, &through, point)?;
-            let MeasuredPoint { target_mm: target, measured_mm: measured, line, .. } = *point;
-            *slot = Some(Mark { target, command, measured, round, line });
+            *slot = Some(mark(point, command(machine, &through, point)?));
         }
     }
     let marks: Vec<Mark> = marks.into_iter().flatten().collect();
-    let mut calibration = calibrate(&machine.optics, &marks, &options.calibrate)?;
+    let calibration = calibrate(&machine.optics, &marks, &options.calibrate)?;
     let table = calibration.table(machine, options.grid)?;
+    Ok(finished(machine, calibration, table, marks))
+}
+
+/// Calibrates the field at another height, and makes its plane one of a table's.
+///
+/// * `options`: rounds that are not listed were marked through nominal optics at height 0
+/// * `z_mm`: height of the plane that the marks lie in, from the nominal work plane towards the head
+/// * `onto`: the table; a plane of the same height is replaced
+///
+/// # Errors
+/// As [`calibrate_field`], or if there is no room for the plane or the table has a drift.
+pub fn calibrate_plane(
+    machine: &Machine,
+    points: &[MeasuredPoint],
+    options: &FieldOptions,
+    (z_mm, onto): (f64, &CorrectionTable),
+) -> Result<FieldCalibration, Error> {
+    if onto.drift() != Drift::NONE {
+        return Err(CalibrateError::Drifted.into());
+    }
+    let optics = raised(&machine.optics, z_mm).ok_or(CalibrateError::Room { z_mm })?;
+    let there = Machine { optics, ..machine.clone() };
+    let rounds: BTreeSet<u32> = points.iter().map(|point| point.round).collect();
+    let mut marks = Vec::with_capacity(points.len());
+    for point in points {
+        let index = rounds.iter().take_while(|round| **round < point.round).count();
+        let through = options.marked_through.get(index).unwrap_or(&MarkedThrough::Nominal);
+        marks.push(mark(point, command(machine, through, point)?));
+    }
+    let calibration = calibrate(&there.optics, &marks, &options.calibrate)?;
+    let own = calibration.table(&there, options.grid)?;
+    let mut planes: Vec<_> =
+        onto.planes().iter().filter(|plane| plane.z_mm != z_mm).cloned().collect();
+    planes.extend(own.planes().iter().map(|plane| CorrectionPlane { z_mm, ..plane.clone() }));
+    planes.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
+    let n_rounds = onto.about().n_rounds.max(calibration.n_rounds);
+    let about = About::of(machine, calibration.model.name(), n_rounds);
+    let table = CorrectionTable::new(about, planes, Drift::NONE).map_err(CalibrateError::from)?;
+    Ok(finished(machine, calibration, table, marks))
+}
+
+/// A measured point with what the mirrors were told.
+fn mark(point: &MeasuredPoint, command: MirrorAngles) -> Mark {
+    let MeasuredPoint { target_mm: target, measured_mm: measured, round, line } = *point;
+    Mark { target, command, measured, round, line }
+}
+
+fn finished(
+    machine: &Machine,
+    mut calibration: Calibration,
+    table: CorrectionTable,
+    marks: Vec<Mark>,
+) -> FieldCalibration {
     if let Err(error) = table.check_limits(&machine.scanner, &machine.optics) {
         let message = format!("this table will be refused for marking: {error}");
         calibration.warnings.push(Warning::new("table", message));
     }
     let advice = advice(&calibration, &marks);
-    Ok(FieldCalibration { calibration, table, marks, advice })
+    FieldCalibration { calibration, table, marks, advice }
 }
 
 /// How far marks were off before and after a correction of drift.

@@ -2,7 +2,7 @@
 
 use super::calibrate_delay::CalibrateDelay;
 use super::photograph::TwinPhotograph;
-use super::{noise, positive};
+use super::{noise, number, positive};
 use clap::{Args, Subcommand, ValueEnum};
 use ftheta::calibrate::calibrate::Model;
 use ftheta::calibrate::picture::Placement;
@@ -35,6 +35,7 @@ Examples:
   ftheta calibrate field --machine S14-f420 --points grid.csv --model polynomial --out table.cor
   ftheta calibrate field --machine S14-f420 --image photo.jpg --pattern grid.json \\
       --sheet-x-mm 270.6 --sheet-y-mm 269.3 --out table.txt
+  ftheta calibrate field --machine F.toml --points high.csv --z-mm 20 --onto table.txt --out table-2.txt
 
 The points are target_x_mm,target_y_mm,measured_x_mm,measured_y_mm[,round]. calibration.html,
 written beside the table, shows what was found and what to do next.")]
@@ -61,6 +62,13 @@ pub struct CalibrateField {
     /// Units of the controller by mm, for points given as its commands.
     #[arg(long, value_name = "K", value_parser = positive)]
     pub units_per_mm: Option<f64>,
+    /// Height of the plane that the marks lie in above the nominal one, towards the head, mm; the
+    /// plane joins those of --onto. Rounds without --marked-through count as marked nominally.
+    #[arg(long, value_name = "Z", requires = "onto", value_parser = number)]
+    pub z_mm: Option<f64>,
+    /// Table that gets the plane of --z-mm, instead of its own of this height if it has one.
+    #[arg(long, value_name = "TABLE", requires = "z_mm")]
+    pub onto: Option<PathBuf>,
     /// Nodes of the table along each side.
     #[arg(long, value_enum, default_value = "65")]
     pub grid: GridSize,

@@ -13,6 +13,7 @@ use ftheta::calibrate::calibrate::{CalibrateOptions, Noise};
 use ftheta::calibrate::table::Grid;
 use ftheta::field_calibration::{
     FieldCalibration, FieldOptions, MarkedThrough, calibrate_drift, calibrate_field,
+    calibrate_plane,
 };
 use ftheta::field_picture::FieldPicture;
 use ftheta::formats::cor_file::CorVersion;
@@ -59,7 +60,13 @@ fn run_field(arguments: &CalibrateField, as_json: bool) -> Result<(), Error> {
         },
         marked_through: through.collect::<Result<_, _>>()?,
     };
-    let field = calibrate_field(&machine, &points, &options)?;
+    let field = match (arguments.z_mm, &arguments.onto) {
+        (Some(z_mm), Some(path)) => {
+            let onto = tables::read(path, &machine)?;
+            calibrate_plane(&machine, &points, &options, (z_mm, &onto))?
+        }
+        _ => calibrate_field(&machine, &points, &options)?,
+    };
     warnings.extend(field.calibration.warnings.iter().cloned());
     tables::write(&field.table, &machine, &arguments.out, CorVersion::Two)?;
     let report = arguments.out.with_file_name("calibration.html");
@@ -159,6 +166,7 @@ fn object(
         "why": calibration.why,
         "points": field.marks.len(),
         "rounds": calibration.n_rounds,
+        "planes_mm": field.table.planes().iter().map(|plane| plane.z_mm).collect::<Vec<_>>(),
         "outliers": calibration.outliers.iter().map(outlier).collect::<Vec<_>>(),
         "axes": {
             "swapped": axes.swapped,

@@ -1,0 +1,136 @@
+//! Fields calibrated at several heights, for heads that move their focus.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+mod hidden;
+
+use ftheta::exchange::{ExchangeError, offsets};
+use ftheta::field_calibration::{FieldCalibration, FieldOptions, calibrate_field, calibrate_plane};
+use ftheta::formats::machine;
+use ftheta::model::calibration::MeasuredPoint;
+use ftheta::model::machine::{Lens, Machine, Optics};
+use ftheta::model::space::MirrorAngles;
+use ftheta::physics::correction::{CorrectionTable, Drift};
+use ftheta::physics::head::{Head, Tracer};
+use ftheta::physics::optics::angles_from_field;
+use ftheta::twin::hidden_head::hidden_head;
+use hidden::{Setup, grid};
+
+const MACHINE: &str = include_str!("../../../gallery/dynamic-focus.toml");
+const FIELD_MM: f64 = 240.0;
+
+fn machine() -> Machine {
+    machine::read("dynamic-focus.toml", MACHINE).unwrap()
+}
+
+/// The head over a plane that is nearer by `z_mm`.
+fn above(head: &Head, z_mm: f64) -> Head {
+    let mut head = head.clone();
+    head.plane.height_mm -= z_mm;
+    head
+}
+
+fn optics_at(machine: &Machine, z_mm: f64) -> Optics {
+    let mut optics = machine.optics.clone();
+    if let Lens::PostObjective { working_distance_mm, .. } = &mut optics.lens {
+        *working_distance_mm -= z_mm;
+    }
+    optics
+}
+
+/// Marks made as if the plane were the nominal one, measured where they are.
+fn points(machine: &Machine, head: &Head, z_mm: f64, seed: u64) -> Vec<MeasuredPoint> {
+    let setup = Setup { field_mm: FIELD_MM, ..Setup::new(9, 10.0, true) };
+    let nominal = |target: &_| angles_from_field(&machine.optics, *target).unwrap();
+    let commands: Vec<MirrorAngles> = setup.targets().iter().map(nominal).collect();
+    let marks = setup.measured(&above(head, z_mm), &commands, 1, seed);
+    let point = |mark: &ftheta::calibrate::mark::Mark| MeasuredPoint {
+        target_mm: mark.target,
+        measured_mm: mark.measured,
+        round: 1,
+        line: mark.line,
+    };
+    marks.iter().map(point).collect()
+}
+
+/// Greatest error over the field at a height, µm.
+fn error_um(machine: &Machine, head: &Head, table: &CorrectionTable, z_mm: f64) -> f64 {
+    let tracer = Tracer::new(&above(head, z_mm));
+    let optics = optics_at(machine, z_mm);
+    let off = grid(21, 0.5 * FIELD_MM).into_iter().map(|target| {
+        let nominal = angles_from_field(&optics, target).unwrap();
+        let [x_rad, y_rad] = table.angles_at([nominal.x_rad, nominal.y_rad], z_mm);
+        let place = tracer.place(MirrorAngles::new(x_rad, y_rad));
+        1e3 * (place.x_mm - target.x_mm).hypot(place.y_mm - target.y_mm)
+    });
+    off.fold(0.0, f64::max)
+}
+
+/// The nominal plane and two more, put onto it in any order.
+fn calibrated(machine: &Machine, head: &Head) -> [FieldCalibration; 2] {
+    let options = FieldOptions::default();
+    let flat = calibrate_field(machine, &points(machine, head, 0.0, 1), &options).unwrap();
+    let mut table = flat.table.clone();
+    let mut last = None;
+    for (z_mm, seed) in [(20.0, 2), (-15.0, 3)] {
+        let points = points(machine, head, z_mm, seed);
+        let found = calibrate_plane(machine, &points, &options, (z_mm, &table)).unwrap();
+        table = found.table.clone();
+        last = Some(found);
+    }
+    [flat, last.unwrap()]
+}
+
+#[test]
+fn planes_make_the_field_true_at_all_heights_between() {
+    let machine = machine();
+    let head = hidden_head(&machine.optics, 901);
+    let [flat, all] = calibrated(&machine, &head);
+    let heights: Vec<f64> = all.table.planes().iter().map(|plane| plane.z_mm).collect();
+    assert_eq!(heights, [-15.0, 0.0, 20.0]);
+    for z_mm in [-15.0, -7.0, 0.0, 10.0, 20.0] {
+        let (one, several) = (
+            error_um(&machine, &head, &flat.table, z_mm),
+            error_um(&machine, &head, &all.table, z_mm),
+        );
+        assert!(several < 30.0, "{several} µm at {z_mm} mm");
+        if z_mm.abs() >= 15.0 {
+            assert!(one > 2.0 * several, "{one} µm by one plane, {several} µm by three");
+        }
+    }
+    // The nominal plane is what it was, to the last bit.
+    let angles = [0.1, -0.05];
+    assert_eq!(flat.table.angles(angles), all.table.angles(angles));
+}
+
+#[test]
+fn a_plane_of_the_same_height_is_replaced() {
+    let machine = machine();
+    let head = hidden_head(&machine.optics, 902);
+    let [_, all] = calibrated(&machine, &head);
+    let again = points(&machine, &head, 20.0, 9);
+    let options = FieldOptions::default();
+    let found = calibrate_plane(&machine, &again, &options, (20.0, &all.table)).unwrap();
+    assert_eq!(found.table.planes().len(), 3);
+    assert_ne!(found.table.planes()[2], all.table.planes()[2]);
+    assert_eq!(found.table.planes()[..2], all.table.planes()[..2]);
+}
+
+#[test]
+fn planes_that_cannot_be_are_refused() {
+    let machine = machine();
+    let head = hidden_head(&machine.optics, 903);
+    let [flat, all] = calibrated(&machine, &head);
+    let points = points(&machine, &head, 0.0, 1);
+    let options = FieldOptions::default();
+    let refused = |z_mm, table: &CorrectionTable| {
+        let found = calibrate_plane(&machine, &points, &options, (z_mm, table));
+        found.map(|_| ()).unwrap_err().to_string()
+    };
+    assert!(refused(460.0, &flat.table).contains("no room"));
+    let drifted = flat.table.clone().with_drift(Drift { gain: [1.001, 1.0], ..Drift::NONE });
+    assert!(refused(10.0, &drifted).contains("drift"));
+    // Files of one plane would lose the others.
+    let lost = offsets(&all.table, &machine, 65, 100.0).unwrap_err();
+    assert_eq!(lost, ExchangeError::Planes { n_planes: 3 });
+}
