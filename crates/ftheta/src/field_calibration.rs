@@ -101,7 +101,7 @@ pub fn calibrate_field(
 /// Calibrates the field at another height, and makes its plane one of a table's.
 ///
 /// * `options`: rounds that are not listed were marked through nominal optics at height 0
-/// * `z_mm`: height of the plane that the marks lie in, from the nominal work plane towards the head
+/// * `z_mm`: height of the plane of the marks, from the nominal work plane towards the head
 /// * `onto`: the table; a plane of the same height is replaced
 ///
 /// # Errors

@@ -88,7 +88,7 @@ fn optimal() {
     let motions = Motions::Known { transitions: &transitions, corners: &corners };
     let draft = OptimalPlanner::new(&machine, motions, options).unwrap().draft(toolpath).unwrap();
     expect![[r#"
-        mark 0 #corner: light edges 370000 2381904 ns, 9.90982393096198 W
+        mark 0 #corner: light edges 370000 2381904 ns, 9.909823930961833 W
         mark 1 #line: light edges 2690000 3813034 ns, 10 W
         jump: hold 4 to 0.000000 0.000000
         jump: 34 voltages

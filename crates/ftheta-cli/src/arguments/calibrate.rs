@@ -18,7 +18,7 @@ pub struct Calibrate {
 #[derive(Subcommand)]
 pub enum CalibrateAction {
     /// A correction table from measured marks.
-    Field(CalibrateField),
+    Field(Box<CalibrateField>),
     /// The laser's delays from a picture of the delay pattern.
     Delay(CalibrateDelay),
     /// A camera's lens from pictures of a printed sheet.
@@ -35,7 +35,7 @@ Examples:
   ftheta calibrate field --machine S14-f420 --points grid.csv --model polynomial --out table.cor
   ftheta calibrate field --machine S14-f420 --image photo.jpg --pattern grid.json \\
       --sheet-x-mm 270.6 --sheet-y-mm 269.3 --out table.txt
-  ftheta calibrate field --machine F.toml --points high.csv --z-mm 20 --onto table.txt --out table-2.txt
+  ftheta calibrate field --machine F.toml --points high.csv --z-mm 20 --onto a.txt --out b.txt
 
 The points are target_x_mm,target_y_mm,measured_x_mm,measured_y_mm[,round]. calibration.html,
 written beside the table, shows what was found and what to do next.")]
