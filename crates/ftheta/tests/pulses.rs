@@ -72,6 +72,25 @@ fn triggered_pulses_keep_their_distance_where_the_beam_is_slower() {
     assert!((triggered.score.energy_j - 50e-6 * n_pulses as f64).abs() < 1e-9);
 }
 
+/// Blocks are handed over one after the other; pulses do not know of it.
+#[test]
+fn pulses_go_on_from_block_to_block() {
+    let back_and_forth = "M2 5 L18 5 M18 6 L2 6 ".repeat(8);
+    for triggered in [true, false] {
+        let marked = run(&pulsed(30.0, triggered), &back_and_forth, Corner::Auto);
+        assert!(marked.plan.n_samples() > 3 * 4096);
+        let spacing = spacing(&marked);
+        assert!(spacing.min > 0.999 && spacing.max < 1.001, "{spacing:?}");
+        // 16 mm at 2 m/s are 8 ms, 240 pulses at 30 kHz, 333 µJ each.
+        let energy_j = 16.0 * 240.0 * 10.0 / 30e3;
+        assert!(
+            (marked.score.energy_j / energy_j - 1.0).abs() < 0.003,
+            "{}",
+            marked.score.energy_j
+        );
+    }
+}
+
 /// A source cannot pulse faster than at its rate, however the beam moves.
 #[test]
 fn triggers_are_never_closer_than_the_rate_allows() {
