@@ -72,10 +72,11 @@ impl MapTable {
         let (column, row) = ((s as usize).min(last), (t as usize).min(last));
         let (su, sv) = (hermite(s - column as f64), hermite(t - row as f64));
         let corner = row * (self.n_cells + 1) + column;
-        let above = corner + self.n_cells + 1;
-        let [a, b] = &self.nodes[corner..corner + 2] else { return None };
-        let [c, d] = &self.nodes[above..above + 2] else { return None };
-        let (low, high) = (edge(a, b, su), edge(c, d, su));
+        let [a, b, c, d] =
+            [corner, corner + 1, corner + self.n_cells + 1, corner + self.n_cells + 2]
+                .map(|index| &self.nodes[index]);
+        let low = edge(a, b, su);
+        let high = edge(c, d, su);
         Some([
             low[0] * sv[0] + low[1] * sv[1] + high[0] * sv[2] + high[1] * sv[3],
             low[2] * sv[0] + low[3] * sv[1] + high[2] * sv[2] + high[3] * sv[3],

@@ -74,6 +74,9 @@ pub(super) fn playback(
         pixel_mm: machine.laser.spot_diameter_mm / 3.0,
         state_stride: u64::MAX,
     };
+    // What plays points sends no triggers.
+    let laser = Laser { pulses_triggered: false, ..machine.laser.clone() };
+    let machine = &Machine { laser, ..machine.clone() };
     let mut twin = twin(machine, &options.mark, &twin_options)?;
     twin.push(&block)?;
     twin.finish();
