@@ -135,7 +135,7 @@ pub fn limits(limits: &Limits) -> Value {
 
 fn twin(score: &Score) -> Value {
     let contour = &score.contour_error_um;
-    let spread = |ratios: RatioSpread| json!({"min": ratios.min, "p01": ratios.p01, "p99": ratios.p99, "max": ratios.max});
+    let spread = |RatioSpread { min, p01, p99, max }| json!({"min": min, "p01": p01, "p99": p99, "max": max});
     let mut figures = json!({
         "duration_s": score.duration_s,
         "contour_error_um": {"max": contour.max, "p99": contour.p99, "rms": contour.rms},

@@ -213,10 +213,11 @@ impl<'a> Renderer<'a> {
             [laser.on_latency_ns, laser.off_latency_ns].map(|ns| ns.min(0).unsigned_abs());
         while let Some(mark) = self.plan.marks.get(self.mark_index) {
             // Pulses that wait for triggers have the pen's energy, each of them.
-            let steps = if laser.pulses_triggered { &[] } else { &mark.steps[..] };
+            let (power_w, steps) = match laser.pulses_triggered {
+                true => (self.plan.pens[mark.pen_index].power_w, &[][..]),
+                false => (mark.power_w, &mark.steps[..]),
+            };
             let edge = if self.n_edges == 0 {
-                let pen_w = self.plan.pens[mark.pen_index].power_w;
-                let power_w = if laser.pulses_triggered { pen_w } else { mark.power_w };
                 LaserEdge { time_ns: mark.on_ns, power_w }
             } else if let Some(&step) = steps.get(self.n_edges - 1) {
                 step

@@ -7,12 +7,11 @@ use ftheta::calibrate::calibrate::{CalibrateOptions, Calibration, Model, calibra
 use ftheta::calibrate::error::CalibrateError;
 use ftheta::calibrate::mark::Mark;
 use ftheta::field_calibration::{FieldOptions, calibrate_drift, calibrate_field};
-use ftheta::model::calibration::MeasuredPoint;
 use ftheta::model::machine::{Axis, Machine};
 use ftheta::model::space::{FieldPoint, MirrorAngles};
 use ftheta::physics::head::Tracer;
 use ftheta::physics::optics::angles_from_field;
-use hidden::{Setup, grid};
+use hidden::{Setup, grid, points};
 
 /// Mean of root mean squares and of maxima over a few heads, µm.
 fn mean_um(setup: Setup, seeds: std::ops::Range<u64>) -> (f64, f64) {
@@ -114,16 +113,6 @@ fn axes_are_found() {
 
 fn machine() -> Machine {
     ftheta::machines::find("S14-f420").unwrap()
-}
-
-fn points(marks: &[Mark]) -> Vec<MeasuredPoint> {
-    let point = |mark: &Mark| MeasuredPoint {
-        target_mm: mark.target,
-        measured_mm: mark.measured,
-        round: mark.round,
-        line: mark.line,
-    };
-    marks.iter().map(point).collect()
 }
 
 /// A second round, marked through the table of the first, makes a better table; four marks follow a

@@ -5,7 +5,7 @@
 mod hidden;
 
 use ftheta::exchange::{ExchangeError, offsets};
-use ftheta::field_calibration::{FieldCalibration, FieldOptions, calibrate_field, calibrate_plane};
+use ftheta::field_calibration::{FieldOptions, calibrate_field, calibrate_plane};
 use ftheta::formats::machine;
 use ftheta::model::calibration::MeasuredPoint;
 use ftheta::model::machine::{Lens, Machine, Optics};
@@ -18,10 +18,6 @@ use hidden::{Setup, grid};
 
 const MACHINE: &str = include_str!("../../../gallery/dynamic-focus.toml");
 const FIELD_MM: f64 = 240.0;
-
-fn machine() -> Machine {
-    machine::read("dynamic-focus.toml", MACHINE).unwrap()
-}
 
 /// The head over a plane that is nearer by `z_mm`.
 fn above(head: &Head, z_mm: f64) -> Head {
@@ -43,14 +39,7 @@ fn points(machine: &Machine, head: &Head, z_mm: f64, seed: u64) -> Vec<MeasuredP
     let setup = Setup { field_mm: FIELD_MM, ..Setup::new(9, 10.0, true) };
     let nominal = |target: &_| angles_from_field(&machine.optics, *target).unwrap();
     let commands: Vec<MirrorAngles> = setup.targets().iter().map(nominal).collect();
-    let marks = setup.measured(&above(head, z_mm), &commands, 1, seed);
-    let point = |mark: &ftheta::calibrate::mark::Mark| MeasuredPoint {
-        target_mm: mark.target,
-        measured_mm: mark.measured,
-        round: 1,
-        line: mark.line,
-    };
-    marks.iter().map(point).collect()
+    hidden::points(&setup.measured(&above(head, z_mm), &commands, 1, seed))
 }
 
 /// Greatest error over the field at a height, µm.
@@ -66,33 +55,35 @@ fn error_um(machine: &Machine, head: &Head, table: &CorrectionTable, z_mm: f64) 
     off.fold(0.0, f64::max)
 }
 
-/// The nominal plane and two more, put onto it in any order.
-fn calibrated(machine: &Machine, head: &Head) -> [FieldCalibration; 2] {
+/// A head with the table of its nominal plane, and with that of two more, put onto it.
+struct Calibrated {
+    machine: Machine,
+    head: Head,
+    flat: CorrectionTable,
+    all: CorrectionTable,
+}
+
+fn calibrated(seed: u64) -> Calibrated {
+    let machine = machine::read("dynamic-focus.toml", MACHINE).unwrap();
+    let head = hidden_head(&machine.optics, seed);
     let options = FieldOptions::default();
-    let flat = calibrate_field(machine, &points(machine, head, 0.0, 1), &options).unwrap();
-    let mut table = flat.table.clone();
-    let mut last = None;
+    let flat = calibrate_field(&machine, &points(&machine, &head, 0.0, 1), &options).unwrap().table;
+    let mut all = flat.clone();
     for (z_mm, seed) in [(20.0, 2), (-15.0, 3)] {
-        let points = points(machine, head, z_mm, seed);
-        let found = calibrate_plane(machine, &points, &options, (z_mm, &table)).unwrap();
-        table = found.table.clone();
-        last = Some(found);
+        let points = points(&machine, &head, z_mm, seed);
+        all = calibrate_plane(&machine, &points, &options, (z_mm, &all)).unwrap().table;
     }
-    [flat, last.unwrap()]
+    Calibrated { machine, head, flat, all }
 }
 
 #[test]
 fn planes_make_the_field_true_at_all_heights_between() {
-    let machine = machine();
-    let head = hidden_head(&machine.optics, 901);
-    let [flat, all] = calibrated(&machine, &head);
-    let heights: Vec<f64> = all.table.planes().iter().map(|plane| plane.z_mm).collect();
+    let Calibrated { machine, head, flat, all } = calibrated(901);
+    let heights: Vec<f64> = all.planes().iter().map(|plane| plane.z_mm).collect();
     assert_eq!(heights, [-15.0, 0.0, 20.0]);
     for z_mm in [-15.0, -7.0, 0.0, 10.0, 20.0] {
-        let (one, several) = (
-            error_um(&machine, &head, &flat.table, z_mm),
-            error_um(&machine, &head, &all.table, z_mm),
-        );
+        let (one, several) =
+            (error_um(&machine, &head, &flat, z_mm), error_um(&machine, &head, &all, z_mm));
         assert!(several < 30.0, "{several} µm at {z_mm} mm");
         if z_mm.abs() >= 15.0 {
             assert!(one > 2.0 * several, "{one} µm by one plane, {several} µm by three");
@@ -100,37 +91,33 @@ fn planes_make_the_field_true_at_all_heights_between() {
     }
     // The nominal plane is what it was, to the last bit.
     let angles = [0.1, -0.05];
-    assert_eq!(flat.table.angles(angles), all.table.angles(angles));
+    assert_eq!(flat.angles(angles), all.angles(angles));
 }
 
 #[test]
 fn a_plane_of_the_same_height_is_replaced() {
-    let machine = machine();
-    let head = hidden_head(&machine.optics, 902);
-    let [_, all] = calibrated(&machine, &head);
+    let Calibrated { machine, head, all, .. } = calibrated(902);
     let again = points(&machine, &head, 20.0, 9);
     let options = FieldOptions::default();
-    let found = calibrate_plane(&machine, &again, &options, (20.0, &all.table)).unwrap();
+    let found = calibrate_plane(&machine, &again, &options, (20.0, &all)).unwrap();
     assert_eq!(found.table.planes().len(), 3);
-    assert_ne!(found.table.planes()[2], all.table.planes()[2]);
-    assert_eq!(found.table.planes()[..2], all.table.planes()[..2]);
+    assert_ne!(found.table.planes()[2], all.planes()[2]);
+    assert_eq!(found.table.planes()[..2], all.planes()[..2]);
 }
 
 #[test]
 fn planes_that_cannot_be_are_refused() {
-    let machine = machine();
-    let head = hidden_head(&machine.optics, 903);
-    let [flat, all] = calibrated(&machine, &head);
+    let Calibrated { machine, head, flat, all } = calibrated(903);
     let points = points(&machine, &head, 0.0, 1);
     let options = FieldOptions::default();
     let refused = |z_mm, table: &CorrectionTable| {
         let found = calibrate_plane(&machine, &points, &options, (z_mm, table));
         found.map(|_| ()).unwrap_err().to_string()
     };
-    assert!(refused(460.0, &flat.table).contains("no room"));
-    let drifted = flat.table.clone().with_drift(Drift { gain: [1.001, 1.0], ..Drift::NONE });
+    assert!(refused(460.0, &flat).contains("no room"));
+    let drifted = flat.clone().with_drift(Drift { gain: [1.001, 1.0], ..Drift::NONE });
     assert!(refused(10.0, &drifted).contains("drift"));
     // Files of one plane would lose the others.
-    let lost = offsets(&all.table, &machine, 65, 100.0).unwrap_err();
+    let lost = offsets(&all, &machine, 65, 100.0).unwrap_err();
     assert_eq!(lost, ExchangeError::Planes { n_planes: 3 });
 }

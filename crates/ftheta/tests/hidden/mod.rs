@@ -3,6 +3,7 @@
 
 use ftheta::calibrate::calibrate::{CalibrateOptions, Calibration, Model, Noise, calibrate};
 use ftheta::calibrate::mark::Mark;
+use ftheta::model::calibration::MeasuredPoint;
 use ftheta::model::machine::{Axis, Lens, Optics};
 use ftheta::model::space::{FieldPoint, MirrorAngles};
 use ftheta::physics::head::{Head, Tracer};
@@ -151,4 +152,15 @@ impl Setup {
 pub fn grid(n_side: usize, half_mm: f64) -> Vec<FieldPoint> {
     let at = |k: usize| half_mm * (2.0 * k as f64 / (n_side - 1) as f64 - 1.0);
     (0..n_side * n_side).map(|k| FieldPoint::new(at(k % n_side), at(k / n_side))).collect()
+}
+
+/// Marks as they are typed in.
+pub fn points(marks: &[Mark]) -> Vec<MeasuredPoint> {
+    let point = |mark: &Mark| MeasuredPoint {
+        target_mm: mark.target,
+        measured_mm: mark.measured,
+        round: mark.round,
+        line: mark.line,
+    };
+    marks.iter().map(point).collect()
 }
