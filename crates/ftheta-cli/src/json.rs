@@ -49,6 +49,7 @@ pub fn marked(
             "planned_um": promise.planned_mm * 1e3,
             "f1_um": promise.f1_mm * 1e3,
             "kt_um": promise.kt_mm * 1e3,
+            "kt_near_um": promise.kt_near_mm * 1e3,
         });
     }
     json!({

@@ -23,7 +23,7 @@ use crate::classic::check_pen;
 use crate::corner::Corners;
 use crate::jump::Transitions;
 use fly_by::FlyBy;
-use ftheta_model::machine::{Drive, Machine, Servo};
+use ftheta_model::machine::{Drive, Machine, Scanner, Servo};
 use ftheta_model::plan::{PlanDraft, Planner};
 use ftheta_model::recipe::Pen;
 use ftheta_model::toolpath::Toolpath;
@@ -78,6 +78,13 @@ const N_REST_TICKS: u32 = 4;
 /// Ways at mark speed before and after light, for a servo that is not known, in its lags.
 const RUN_LAGS: [f64; 2] = [2.5, 1.0];
 
+/// Longest way between marks that counts as near, mm.
+pub const NEAR_MM: f64 = 1.0;
+/// How many times the torque constant's uncertainty is held on near ways, and up to which one:
+/// there it costs next to no time, on long ones it does.
+const NEAR_KT_FACTOR: f64 = 4.0;
+const NEAR_KT_MAX: f64 = 0.02;
+
 /// How corners are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Corner {
@@ -127,11 +134,19 @@ pub enum Motions<'a> {
         /// Of this machine's scanner and period, with an atlas that reaches as far as
         /// [`longest_step_rad`].
         transitions: &'a Transitions,
-        /// Of the same.
+        /// The same for ways of at most [`NEAR_MM`], on motors of [`near_scanner`].
+        near: &'a Transitions,
+        /// Of the same as `transitions`.
         corners: &'a Corners,
     },
     /// By angles, which the servo follows after its lag.
     Lag,
+}
+
+/// The scanner as less certain as near ways can be planned for.
+pub fn near_scanner(scanner: &Scanner) -> Scanner {
+    let kt = scanner.kt_uncertainty;
+    Scanner { kt_uncertainty: kt.max(NEAR_KT_MAX.min(NEAR_KT_FACTOR * kt)), ..scanner.clone() }
 }
 
 /// Whether commands can be computed from voltages.
@@ -169,11 +184,12 @@ impl<'a> OptimalPlanner<'a> {
         let lag_s = gains.lag_s(&galvo);
         let mut smoothing = Smoothing::new(machine, &galvo, &gains, &inverse);
         let (mover, corners) = match motions {
-            Motions::Known { transitions, corners } => {
+            Motions::Known { transitions, near, corners } => {
                 let current_share = 1.0 - 0.5 * options.restraint.current_reserve;
                 let current_max_a = current_share * machine.scanner.current_max_a;
                 let reserve = options.voltage_reserve;
-                let fly_by = FlyBy::new(transitions, machine, gains, reserve, current_max_a);
+                let fly_by =
+                    FlyBy::new([transitions, near], machine, gains, reserve, current_max_a);
                 (Mover::Voltage(Box::new(fly_by)), Some(corners))
             }
             Motions::Lag => {

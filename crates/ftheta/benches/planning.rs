@@ -34,7 +34,7 @@ use ftheta::physics::servo::Gains;
 use ftheta::planner::corner::Corners;
 use ftheta::planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
 use ftheta::planner::optimal::{
-    Corner, Motions, OptimalOptions, OptimalPlanner, RESTRAINTS, longest_step_rad,
+    Corner, Motions, OptimalOptions, OptimalPlanner, RESTRAINTS, longest_step_rad, near_scanner,
 };
 use ftheta::planner::render::Renderer;
 use ftheta::toolpath::lay::{LayOptions, Order, lay};
@@ -58,6 +58,7 @@ fn main() {
 struct Solver {
     machine: Machine,
     transitions: Transitions,
+    near: Transitions,
     corners: Corners,
 }
 
@@ -76,11 +77,13 @@ static SOLVER: LazyLock<Solver> = LazyLock::new(|| {
     atlas.extend(0, longest_rad).unwrap();
     let gains = Gains::design(&machine.scanner, axis.tick_s).unwrap();
     let corners = Corners::new(&machine.scanner, axis, Some(&gains)).unwrap();
-    Solver { transitions: Transitions::with_atlas(atlas).unwrap(), corners, machine }
+    let transitions = Transitions::with_atlas(atlas).unwrap();
+    let near = transitions.less_certain(&near_scanner(&machine.scanner)).unwrap();
+    Solver { transitions, near, corners, machine }
 });
 
 fn prepared() -> OptimalPlanner<'static> {
-    let Solver { machine, transitions, corners } = &*SOLVER;
+    let Solver { machine, transitions, near, corners } = &*SOLVER;
     let options = OptimalOptions {
         care: 1.0,
         tolerance_mm: TOLERANCE_MM,
@@ -88,7 +91,7 @@ fn prepared() -> OptimalPlanner<'static> {
         voltage_reserve: RESERVE,
         restraint: RESTRAINTS[0],
     };
-    OptimalPlanner::new(machine, Motions::Known { transitions, corners }, options).unwrap()
+    OptimalPlanner::new(machine, Motions::Known { transitions, near, corners }, options).unwrap()
 }
 
 fn toolpath(drawing: &[u8]) -> Toolpath {

@@ -56,23 +56,25 @@ impl AtlasStore {
         Ok(Atlas::restore(scanner, axis, levels)?)
     }
 
-    /// Gives transitions and corners back what programs have solved for them before.
+    /// Gives transitions, and corners of the same, back what programs have solved for them before.
     pub(crate) fn restore(
         &self,
         transitions: &Transitions,
-        corners: &Corners,
+        corners: Option<&Corners>,
         warnings: &mut Vec<Warning>,
     ) {
         let solved = self.read_solved(solved_key(transitions.atlas()), warnings);
         transitions.restore(&solved);
-        corners.restore(&solved);
+        if let Some(corners) = corners {
+            corners.restore(&solved);
+        }
     }
 
     /// Keeps what programs have solved for transitions and corners, besides what is kept already.
     pub(crate) fn save_solved(
         &self,
         transitions: &Transitions,
-        corners: &Corners,
+        corners: Option<&Corners>,
         warnings: &mut Vec<Warning>,
     ) {
         if self.folder.is_none() {
@@ -83,7 +85,7 @@ impl AtlasStore {
         // first.
         let mut kept = self.read_solved(key, &mut Vec::new());
         let mut solved = transitions.solved();
-        solved.append(&mut corners.solved());
+        solved.extend(corners.into_iter().flat_map(Corners::solved));
         if solved.keys().all(|which| kept.contains_key(which)) {
             return;
         }

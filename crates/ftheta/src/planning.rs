@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::mark::{MarkOptions, Stage};
 use crate::promise::{Promise, promise};
-use ftheta_model::machine::Machine;
+use ftheta_model::machine::{Machine, Scanner};
 use ftheta_model::plan::Planner;
 use ftheta_model::toolpath::Toolpath;
 use ftheta_model::warning::Warning;
@@ -121,20 +121,29 @@ impl Planning<'_> {
         let Self { machine, options, .. } = *self;
         let mut refused = None;
         for restraint in optimal::RESTRAINTS {
-            let atlas = self.atlas(toolpath, &restraint, warnings, observer)?;
+            let mut scanner = machine.scanner.clone();
+            scanner.current_max_a *= 1.0 - restraint.current_reserve;
+            let axis = self.axis_options(&restraint);
+            let longest_rad = optimal::longest_step_rad(toolpath, machine);
+            let atlas = self.atlas(&scanner, axis, longest_rad, warnings, observer)?;
             observer(Stage::Plan);
-            let voltage_reserve = atlas.axis_options().voltage_reserve;
             let transitions = Transitions::with_atlas(atlas)?;
-            let optimal = self.optimal(restraint, voltage_reserve, care);
-            let gains = Gains::design(&machine.scanner, machine.output.period_s())?;
-            let scanner = transitions.atlas().scanner().clone();
-            let corners = Corners::new(&scanner, transitions.atlas().axis_options(), Some(&gains))?;
-            let motions = Motions::Known { transitions: &transitions, corners: &corners };
+            let near = transitions.less_certain(&optimal::near_scanner(&scanner))?;
+            let gains = Gains::design(&machine.scanner, axis.tick_s)?;
+            let corners = Corners::new(&scanner, axis, Some(&gains))?;
+            let motions =
+                Motions::Known { transitions: &transitions, near: &near, corners: &corners };
+            let optimal = self.optimal(restraint, axis.voltage_reserve, care);
             let planner = OptimalPlanner::new(machine, motions, optimal)?;
-            options.atlas_store.restore(&transitions, &corners, warnings);
+            let kept = [(&transitions, Some(&corners)), (&near, None)];
+            for (transitions, corners) in kept {
+                options.atlas_store.restore(transitions, corners, warnings);
+            }
             planner.solve(toolpath);
             let draft = planner.draft(toolpath.clone());
-            options.atlas_store.save_solved(&transitions, &corners, warnings);
+            for (transitions, corners) in kept {
+                options.atlas_store.save_solved(transitions, corners, warnings);
+            }
             let draft = draft?;
             observer(Stage::Audit);
             match Plan::new(draft) {
@@ -152,26 +161,28 @@ impl Planning<'_> {
         self.plan_classic(toolpath.clone(), observer)
     }
 
-    /// The atlas for a toolpath, as far as its longest jump.
-    fn atlas(
-        &self,
-        toolpath: &Toolpath,
-        restraint: &Restraint,
-        warnings: &mut Vec<Warning>,
-        observer: &mut dyn FnMut(Stage),
-    ) -> Result<Atlas, Error> {
+    fn axis_options(&self, restraint: &Restraint) -> AxisOptions {
         let Self { machine, options, .. } = *self;
         let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
-        let axis = AxisOptions {
+        AxisOptions {
             model: Model::Held { epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD) },
             tick_s: machine.output.period_s(),
             voltage_reserve: 1.0 - (1.0 - options.reserve) * (1.0 - restraint.voltage_reserve),
             current_bound: CurrentBound::Always,
-        };
-        let mut scanner = machine.scanner.clone();
-        scanner.current_max_a *= 1.0 - restraint.current_reserve;
-        let mut atlas = options.atlas_store.load(&scanner, axis, warnings)?;
-        let longest_rad = optimal::longest_step_rad(toolpath, machine);
+        }
+    }
+
+    /// The atlas as far as the longest jump.
+    fn atlas(
+        &self,
+        scanner: &Scanner,
+        axis: AxisOptions,
+        longest_rad: f64,
+        warnings: &mut Vec<Warning>,
+        observer: &mut dyn FnMut(Stage),
+    ) -> Result<Atlas, Error> {
+        let options = self.options;
+        let mut atlas = options.atlas_store.load(scanner, axis, warnings)?;
         let mut n_kept = atlas.n_sequences();
         while atlas.grow(longest_rad)? {
             observer(Stage::Atlas((atlas.reach_rad() / longest_rad).sqrt()));

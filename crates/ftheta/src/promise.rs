@@ -9,8 +9,10 @@ use ftheta_physics::galvo::{Galvo, State};
 use ftheta_physics::optics::field_from_angles;
 use ftheta_physics::plan::Plan;
 use ftheta_physics::servo::Gains;
+use ftheta_planner::optimal::near_scanner;
 use ftheta_planner::render::Renderer;
-use std::thread;
+use std::panic::resume_unwind;
+use std::thread::{self, ScopedJoinHandle};
 
 /// Greatest distances of the lit beam from its mark, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,10 +23,12 @@ pub struct Promise {
     pub f1_mm: f64,
     /// The same for the torque constant.
     pub kt_mm: f64,
+    /// The same for what near ways are planned for ([`near_scanner`]), which long ones may miss.
+    pub kt_near_mm: f64,
 }
 
 impl Promise {
-    /// Contour error on any one of these motors.
+    /// Contour error on any one motor within the uncertainties.
     pub fn contour_mm(&self) -> f64 {
         self.planned_mm.max(self.f1_mm).max(self.kt_mm)
     }
@@ -49,14 +53,16 @@ pub fn promise(plan: &Plan) -> Result<Option<Promise>, Error> {
     let torque =
         |part: f64| Galvo { torque_constant: nominal.torque_constant * (1.0 + part), ..nominal };
     let (f1, kt) = (scanner.f1_uncertainty, scanner.kt_uncertainty);
-    let plants = [mode(-f1), mode(f1), torque(-kt), torque(kt)];
-    let errors_mm = thread::scope(|scope| {
-        let played = plants.map(|plant| scope.spawn(move || worst_mm(plan, &plant, gains)));
+    let far = near_scanner(scanner).kt_uncertainty;
+    let borders = [[mode(-f1), mode(f1)], [torque(-kt), torque(kt)], [torque(-far), torque(far)]];
+    let [f1_mm, kt_mm, kt_near_mm] = thread::scope(|scope| {
+        let play = |plant| scope.spawn(move || worst_mm(plan, &plant, gains));
+        let played = borders.map(|pair| pair.map(play));
         // A panic in another thread is a panic here.
-        played.map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        let told = |one: ScopedJoinHandle<'_, f64>| one.join().unwrap_or_else(|p| resume_unwind(p));
+        played.map(|pair| pair.map(told).into_iter().fold(0.0, f64::max))
     });
-    let [slow, fast, weak, strong] = errors_mm;
-    Ok(Some(Promise { planned_mm, f1_mm: slow.max(fast), kt_mm: weak.max(strong) }))
+    Ok(Some(Promise { planned_mm, f1_mm, kt_mm, kt_near_mm }))
 }
 
 /// Greatest distance of the lit beam from its marks on a motor, mm.

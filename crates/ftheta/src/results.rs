@@ -10,7 +10,7 @@ use ftheta_model::plan::Planner;
 use ftheta_model::recipe::Interpolation;
 use ftheta_model::warning::Warning;
 use ftheta_planner::classic::Settings;
-use ftheta_planner::optimal::is_servo_known;
+use ftheta_planner::optimal::{NEAR_MM, is_servo_known, near_scanner};
 use ftheta_report::comparison::Rival;
 use ftheta_report::plate::{PlateOptions, plate_png};
 use ftheta_report::report::{ReportInput, TimeSplit, report_html};
@@ -129,14 +129,16 @@ fn planned_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
     let machine = &marked.plan.machine;
     let known = is_servo_known(machine);
     let (f1, kt) = (machine.scanner.f1_uncertainty, machine.scanner.kt_uncertainty);
-    let (f1, kt) = (format!("f1 ±{} %", f1 * 100.0), format!("Kt ±{} %", kt * 100.0));
+    let near = near_scanner(&machine.scanner).kt_uncertainty;
+    let f1 = format!("f1 ±{} %", f1 * 100.0);
+    let [kt, kt_near] = [kt, near].map(|part| format!("Kt ±{} %", part * 100.0));
     let sent = match machine.output.drive {
         Drive::Voltage => "voltage and state",
         _ if known => "words, inverse of the servo",
         _ => "words ahead by the lag",
     };
     let transitions = match known {
-        true => format!("held by the servo, {f1}, {kt}"),
+        true => format!("held by the servo, {f1}, {kt} ({kt_near} up to {NEAR_MM} mm)"),
         false => "smooth angles".into(),
     };
     let promised = |what: &str, error: fn(&Promise) -> f64| {
@@ -152,6 +154,7 @@ fn planned_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
         promised("nominal", |promise| promise.planned_mm),
         promised(&f1, |promise| promise.f1_mm),
         promised(&kt, |promise| promise.kt_mm),
+        promised(&kt_near, |promise| promise.kt_near_mm),
     ]
 }
 

@@ -13,7 +13,7 @@ use ftheta::planner::classic::{self, Settings};
 use ftheta::planner::corner::Corners;
 use ftheta::planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
 use ftheta::planner::optimal::{
-    Corner, Motions, OptimalOptions, OptimalPlanner, RESTRAINTS, longest_step_rad,
+    Corner, Motions, OptimalOptions, OptimalPlanner, RESTRAINTS, longest_step_rad, near_scanner,
 };
 use ftheta::toolpath::lay::{LayOptions, Order, lay};
 use std::fmt::Write;
@@ -85,7 +85,8 @@ fn optimal() {
         voltage_reserve: 0.12,
         restraint: RESTRAINTS[0],
     };
-    let motions = Motions::Known { transitions: &transitions, corners: &corners };
+    let near = transitions.less_certain(&near_scanner(&machine.scanner)).unwrap();
+    let motions = Motions::Known { transitions: &transitions, near: &near, corners: &corners };
     let draft = OptimalPlanner::new(&machine, motions, options).unwrap().draft(toolpath).unwrap();
     expect![[r#"
         mark 0 #corner: light edges 370000 2381904 ns, 9.909823930961833 W

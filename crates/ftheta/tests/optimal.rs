@@ -136,6 +136,35 @@ fn uncertain_motors_hold_the_tolerance() {
     }
 }
 
+/// Ways of at most 1 mm, from the field centre on: dashes in a row, strokes all about, hatch
+/// lines half a millimetre apart.
+const NEAR: [&str; 3] = [
+    r#"<path d="M10.5 10.5 h2 m1 0 h2 m1 0 h2 m1 0 h2"/>"#,
+    r#"<path d="M10.5 10.5 h3"/><path d="M14 11 v3"/><path d="M13.5 14.5 l-2 -2"/>
+       <path d="M11 12 l-2 3"/><path d="M8.5 15.5 h3"/><path d="M12.4 15.5 l2 3"/>"#,
+    r#"<path d="M10.5 10.5 h4 m0 .5 h-4 m0 .5 h4 m0 .5 h-4 m0 .5 h4 m0 .5 h-4 m0 .5 h4"/>"#,
+];
+
+/// Near ways hold four times the torque constant's uncertainty, by words and by voltages.
+#[test]
+fn near_ways_hold_more_torque_and_less() {
+    let mut volts = preset("S10-f160");
+    volts.output.drive = Drive::Voltage;
+    for (machine, elements) in
+        [preset("S10-f160"), volts].iter().flat_map(|machine| NEAR.map(|one| (machine, one)))
+    {
+        for kt in [0.02, -0.02] {
+            let mismatch = Mismatch { kt, ..Mismatch::default() };
+            let options = MarkOptions { mismatch, speed_mm_s: Some(2000.0), ..keep() };
+            let marked = run(elements, machine, &options).unwrap();
+            let error_um = marked.score.contour_error_um.max;
+            let promised_um = 1e3 * marked.promise.unwrap().kt_near_mm;
+            assert!(error_um <= promised_um + 0.3, "{error_um} µm, promised {promised_um} µm");
+            assert!(promised_um <= 10.0, "{elements} with {kt}: {promised_um} µm");
+        }
+    }
+}
+
 /// A head that takes positions and tells no more than its lag.
 #[test]
 fn a_head_of_unknown_servo_keeps_the_tolerance() {
@@ -267,12 +296,12 @@ fn stored(folder: &Path) -> MarkOptions {
     MarkOptions { order: Some(Order::Keep), atlas_store, ..MarkOptions::default() }
 }
 
-/// The atlas and the solved programs, and nothing half-written.
-fn kept_files(folder: &Path) -> [std::path::PathBuf; 2] {
+/// The atlas and what was solved for all ways and for near ones, and nothing half-written.
+fn kept_files(folder: &Path) -> Vec<std::path::PathBuf> {
     let files: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(files.len(), 2, "{files:?}");
-    let of_kind = |kind: &str| files.iter().find(|file| file.extension().unwrap() == kind).unwrap();
-    ["atlas", "solved"].map(of_kind).map(Clone::clone)
+    let n_of = |kind: &str| files.iter().filter(|file| file.extension().unwrap() == kind).count();
+    assert_eq!((files.len(), n_of("atlas"), n_of("solved")), (3, 1, 2), "{files:?}");
+    files
 }
 
 #[test]

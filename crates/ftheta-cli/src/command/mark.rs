@@ -11,7 +11,7 @@ use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::warning::Warning;
 use ftheta::output::Output;
 use ftheta::physics::audit::Limits;
-use ftheta::planner::optimal::Corner;
+use ftheta::planner::optimal::{Corner, near_scanner};
 use ftheta::results::{self, About, delay_rows};
 use ftheta::twin::hidden_head::hidden_head;
 use ftheta::{Error, import, machines, tables};
@@ -149,8 +149,13 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
     print_limits(marked.plan.limits());
     if let Some(promise) = &marked.promise {
         let scanner = &marked.plan.machine.scanner;
+        let near = near_scanner(scanner).kt_uncertainty;
+        let wide = match near > scanner.kt_uncertainty {
+            true => format!(", {:.1} µm with ±{} %", promise.kt_near_mm * 1e3, near * 100.0),
+            false => String::new(),
+        };
         say!(
-            "promise  contour error {:.1} µm as planned, {:.1} µm with f1 ±{} %, {:.1} µm with Kt ±{} %",
+            "promise  contour error {:.1} µm as planned, {:.1} µm with f1 ±{} %, {:.1} µm with Kt ±{} %{wide}",
             promise.planned_mm * 1e3,
             promise.f1_mm * 1e3,
             scanner.f1_uncertainty * 100.0,

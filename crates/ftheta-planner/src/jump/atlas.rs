@@ -19,7 +19,7 @@ const N_SEGMENTS: usize = 300;
 /// of the step: 5 and 20 % more of it leave 0.8 and 0.5 of the heat (`design/control.md` B).
 const LEVELS: [f64; N_LEVELS] = [1.0, 0.9, 0.69];
 /// Raised when other voltages come out for the same parameters.
-pub const ATLAS_VERSION: u32 = 3;
+pub const ATLAS_VERSION: u32 = 4;
 /// Number of levels.
 pub const N_LEVELS: usize = 3;
 

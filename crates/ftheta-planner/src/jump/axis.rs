@@ -306,6 +306,11 @@ impl Axis {
         program::solve(self, &request).map(|solution| solution.factor)
     }
 
+    /// The held plants that programs know, with the part of the bound that they keep there.
+    pub(super) fn held_in_programs(&self) -> impl Iterator<Item = (&Held, f64)> {
+        self.held.iter().filter_map(|held| Some((held, held.share?)))
+    }
+
     /// Whether the end is where the axis creeps to without voltage, not where it is.
     pub(super) fn creeps(&self) -> bool {
         !self.plants.is_empty()

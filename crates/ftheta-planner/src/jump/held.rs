@@ -21,6 +21,8 @@ pub(super) struct Held {
     motion: SMatrix<f64, N_DEVIATIONS, N_DEVIATIONS>,
     from_state: SMatrix<f64, N_DEVIATIONS, 5>,
     from_voltage: Deviation,
+    /// Part of the bound that programs keep; none where the plant before stands for this one.
+    pub(super) share: Option<f64>,
     /// Weights, at the end, of how far the mirror is beside the nominal one at each look, rad.
     pub(super) looks: Vec<Deviation>,
 }
@@ -44,11 +46,19 @@ impl Held {
             torque_constant: nominal.torque_constant * (1.0 + part),
             ..nominal
         };
-        let borders = [(f1, mode(f1)), (f1, mode(-f1)), (kt, torque(kt)), (kt, torque(-kt))];
-        let plants = borders.into_iter().filter(|(uncertainty, _)| *uncertainty > 0.0);
-        Ok(plants
-            .map(|(_, plant)| Self::new(&nominal, &plant, k.as_slice(), tick_s, lag_ticks))
-            .collect())
+        // More torque and less deviate the same way with opposite signs, but for their square.
+        let borders = [
+            (f1, mode(f1), Some(1.0)),
+            (f1, mode(-f1), Some(1.0)),
+            (kt, torque(-kt), Some(1.0 - kt)),
+            (kt, torque(kt), None),
+        ];
+        let plants = borders.into_iter().filter(|(uncertainty, ..)| *uncertainty > 0.0);
+        let held = |plant: &Galvo, share| Self {
+            share,
+            ..Self::new(&nominal, plant, k.as_slice(), tick_s, lag_ticks)
+        };
+        Ok(plants.map(|(_, plant, share)| held(&plant, share)).collect())
     }
 
     fn new(nominal: &Galvo, plant: &Galvo, k: &[f64], tick_s: f64, lag_ticks: f64) -> Self {
@@ -80,7 +90,7 @@ impl Held {
             }
             looks.push(weights);
         }
-        Self { motion, from_state, from_voltage, looks }
+        Self { motion, from_state, from_voltage, share: None, looks }
     }
 
     /// How a difference at the end depends on the nominal states and the voltage of each tick.

@@ -187,7 +187,7 @@ pub(super) fn solve(axis: &Axis, request: &Request) -> Result<Solution, JumpErro
         n_states: axis.active.len(),
         n_plants: axis.plants.len(),
         n_looks: axis.plants.first().map_or(0, |plant| plant.looks.len()),
-        n_held: axis.held.len(),
+        n_held: axis.held_in_programs().count(),
         rests_anywhere: axis.rests_anywhere,
     };
     let units = Units::new(axis, request);
@@ -293,7 +293,7 @@ impl Program<'_> {
     /// Adds how each held plant deviates at the end.
     fn held_deviations(&mut self) {
         let (axis, n_ticks) = (self.axis, self.request.n_ticks);
-        for (plant, one) in axis.held.iter().enumerate() {
+        for (plant, (one, _)) in axis.held_in_programs().enumerate() {
             for index in 0..N_DEVIATIONS {
                 let ticks = one.deviation(index, n_ticks);
                 let column = self.layout.held(plant, index);
@@ -321,14 +321,14 @@ impl Program<'_> {
     /// Adds that each held plant is near the nominal mirror at each look.
     fn held_bounds(&mut self) {
         let Self { axis, layout, units, rows, .. } = self;
-        for (plant, one) in axis.held.iter().enumerate() {
+        for (plant, (one, share)) in axis.held_in_programs().enumerate() {
             for weights in &one.looks {
                 for sign in [1.0, -1.0] {
                     let entries = (0..N_DEVIATIONS).map(|index| {
                         let weight = sign * weights[index] * units.deviation(index);
                         (layout.held(plant, index), weight / axis.residual_max_rad)
                     });
-                    rows.add(entries, 1.0);
+                    rows.add(entries, share);
                 }
             }
         }

@@ -70,6 +70,8 @@ pub struct Transitions {
     atlas: Atlas,
     angle_max_rad: f64,
     speed_max_rad_s: f64,
+    /// Steps that no axis exceeds by number of ticks, as far as they are known, rad.
+    longest_rad: Vec<f64>,
     /// One for each number of ticks of the schedule.
     fans: Vec<Fan>,
     brakes: OnceLock<Result<[Brakes; 2], JumpError>>,
@@ -140,10 +142,22 @@ impl Transitions {
             axis: Axis::new(scanner, atlas.axis_options())?,
             angle_max_rad: scanner.angle_max_rad,
             speed_max_rad_s: scanner.speed_max_rad_s,
+            longest_rad: atlas.steps_rad().to_vec(),
             atlas,
             fans,
             brakes: OnceLock::new(),
         })
+    }
+
+    /// The same for motors that are known less well: without an atlas, so only for
+    /// [`Self::meet_both`].
+    ///
+    /// # Errors
+    /// If a parameter is out of range.
+    pub fn less_certain(&self, scanner: &Scanner) -> Result<Self, JumpError> {
+        let options = self.atlas.axis_options();
+        let other = Self::with_atlas(Atlas::restore(scanner, options, Default::default())?)?;
+        Ok(Self { longest_rad: self.longest_rad.clone(), ..other })
     }
 
     /// The jumps from rest to rest.
@@ -239,11 +253,8 @@ impl Transitions {
     /// # Errors
     /// As [`Self::plan`].
     pub fn plan_both(&self, routes: &[Route; 2]) -> Result<Option<[Transition<'_>; 2]>, JumpError> {
-        routes.iter().try_for_each(|route| self.check(route))?;
-        for pair in self.candidates(*routes) {
-            if routes.iter().zip(&pair).all(|(route, one)| self.keeps_limits(route, one)) {
-                return Ok(Some(pair));
-            }
+        if let Some(pair) = self.meet_both(routes)? {
+            return Ok(Some(pair));
         }
         let [first, second] = routes;
         let Some(one) = self.detour(first, 0)? else {
@@ -254,6 +265,19 @@ impl Transitions {
         };
         // What was in time before waits; then both take the same time.
         Ok(self.detour(first, other.n_ticks())?.map(|one| [one, other]))
+    }
+
+    /// As [`Self::plan_both`] where neither axis has to stop and start again, whatever the reach of
+    /// the atlas; `None` if there is no such motion.
+    ///
+    /// # Errors
+    /// If an end is out of range.
+    pub fn meet_both(&self, routes: &[Route; 2]) -> Result<Option<[Transition<'_>; 2]>, JumpError> {
+        routes.iter().try_for_each(|route| self.check(route))?;
+        let keep = |pair: &[Transition<'_>; 2]| {
+            routes.iter().zip(pair).all(|(route, one)| self.keeps_limits(route, one))
+        };
+        Ok(self.candidates(*routes).find(keep))
     }
 
     /// Voltages that meet the ends of all routes, by number of ticks.
@@ -293,7 +317,7 @@ impl Transitions {
         let gained = ask.gain_rad_s().abs() / gain_max;
         // The greatest torque one way, then the other.
         let farthest_rad = 0.25 * gain_max * duration_s * (1.0 - gained * gained);
-        let longest = self.atlas.steps_rad().get(n_ticks).copied().unwrap_or(f64::INFINITY);
+        let longest = self.longest_rad.get(n_ticks).copied().unwrap_or(f64::INFINITY);
         displacement <= SLACK * longest.min(farthest_rad) && gained <= 1.0
     }
 

@@ -4,11 +4,13 @@
 //! (a lens bends straight lines a little, a mark may end in a curve) is added by the voltages of
 //! least square that do it in the same time.
 
+use super::NEAR_MM;
 use super::heat::Heat;
-use crate::jump::{JumpError, Route, Transitions};
+use crate::jump::{JumpError, Route, Transition, Transitions};
 use ftheta_model::machine::Machine;
 use ftheta_physics::audit::COMMAND_SHARE;
 use ftheta_physics::galvo::{CURRENT, Galvo, State, Step};
+use ftheta_physics::optics::scale_mm_per_rad;
 use ftheta_physics::servo::Gains;
 use nalgebra::{SMatrix, SVector};
 use std::sync::OnceLock;
@@ -25,6 +27,8 @@ const STOP_SHARE: f64 = 0.2;
 const STOP_TICKS: f64 = 40.0;
 /// Part of what the fans leave of the voltage that corrections may use.
 const CORRECTION_SHARE: f64 = 0.5;
+/// Part by which a near way may be longer than it says: optics and rounding.
+const ROUNDING: f64 = 0.01;
 
 /// Both axes at a tick.
 pub(super) type States = [State; 2];
@@ -35,6 +39,8 @@ pub(super) type Voltages = Vec<[f64; 2]>;
 /// Plans motion between states.
 pub(super) struct FlyBy<'a> {
     transitions: &'a Transitions,
+    near: &'a Transitions,
+    near_rad: f64,
     machine: &'a Machine,
     step: Step,
     mirror_row: State,
@@ -52,9 +58,10 @@ pub(super) struct FlyBy<'a> {
 }
 
 impl<'a> FlyBy<'a> {
+    /// * `transitions`: for all ways, and for near ones
     /// * `voltage_reserve`: part of the voltage that transitions leave
     pub(super) fn new(
-        transitions: &'a Transitions,
+        [transitions, near]: [&'a Transitions; 2],
         machine: &'a Machine,
         gains: Gains,
         voltage_reserve: f64,
@@ -67,6 +74,8 @@ impl<'a> FlyBy<'a> {
         let free = 1.0 - voltage_reserve * CORRECTION_SHARE;
         Self {
             transitions,
+            near,
+            near_rad: (1.0 + ROUNDING) * NEAR_MM / scale_mm_per_rad(&machine.optics),
             machine,
             step: galvo.step(tick_s),
             mirror_row: galvo.mirror_row(),
@@ -100,7 +109,7 @@ impl<'a> FlyBy<'a> {
             from_rad_s: self.speed_row.dot(&from[axis]),
             to_rad_s: self.speed_row.dot(&to[axis]),
         });
-        let planned = self.transitions.plan_both(&routes)?;
+        let planned = self.fewest(&routes)?;
         let n_least = n_least.max(N_TICKS_MIN);
         let mut n_fewest = n_least;
         if let Some([x, y]) = planned {
@@ -126,6 +135,17 @@ impl<'a> FlyBy<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// The transitions of both axes in the fewest ticks that hold what is not known of the motors.
+    fn fewest(&self, routes: &[Route; 2]) -> Result<Option<[Transition<'_>; 2]>, JumpError> {
+        let [x_rad, y_rad] = routes.each_ref().map(|route| route.to_rad - route.from_rad);
+        if x_rad.hypot(y_rad) <= self.near_rad
+            && let Some(pair) = self.near.meet_both(routes)?
+        {
+            return Ok(Some(pair));
+        }
+        self.transitions.plan_both(routes)
     }
 
     /// Adds what makes both ends exact.
