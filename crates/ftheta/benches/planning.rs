@@ -11,10 +11,6 @@
 //! | `dense_curve` | duration / 50 |
 //! | `segments_of_5_um` | the same time for each item |
 //! | `render_tracks` | 20 million items a second |
-//!
-//! Dense paths touch new memory all the time. A process that keeps what it had, as one that plans
-//! layer after layer does, spares a quarter of their time; with the GNU C library that is
-//! `MALLOC_TOP_PAD_=67108864 MALLOC_MMAP_THRESHOLD_=1073741824 MALLOC_TRIM_THRESHOLD_=1073741824`.
 
 #![allow(clippy::unwrap_used, reason = "a bench may stop at once")]
 

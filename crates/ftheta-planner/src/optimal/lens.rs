@@ -82,9 +82,9 @@ impl<'a> LensAxis<'a> {
     /// What the lens allows along a path, all of it as slow as its worst vertex.
     pub(super) fn limits(&self, path: &Path, smoothing: &Smoothing) -> LensLimits {
         let (mut along, mut steepest) = (0.0_f64, 0.0_f64);
-        for (vertex, station) in path.vertices.iter().zip(&path.stations) {
-            let slope = lens_gradient(self.optics, (*vertex).into()).unwrap_or_default();
-            let ways = [station.arriving, station.leaving].map(|way| slope.dot(way).abs());
+        for (index, &vertex) in path.vertices.iter().enumerate() {
+            let slope = lens_gradient(self.optics, vertex.into()).unwrap_or_default();
+            let ways = path.directions(index).map(|way| slope.dot(way).abs());
             along = along.max(ways[0].max(ways[1]));
             steepest = steepest.max(slope.hypot());
         }

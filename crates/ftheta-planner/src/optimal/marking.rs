@@ -183,7 +183,7 @@ impl Marking<'_> {
         let mut end_s = start_s;
         let light_s = start_s + self.run_s[0];
         let mut progress_mm = Vec::new();
-        let corner_mm = |turn: &Turn| path.stations[turn.vertex].distance_mm;
+        let corner_mm = |turn: &Turn| path.distances_mm[turn.vertex];
         for (piece_index, piece) in pieces.iter().enumerate() {
             let piece_s = self.weave.now_s();
             self.weave.follow(index, &piece.laid);
@@ -245,13 +245,12 @@ impl Marking<'_> {
             let (before_mm, after_mm) = (runs_mm[0] + margin_mm, runs_mm[1] + margin_mm);
             let room_mm = match turns.last() {
                 Some(last) => {
-                    let way_mm =
-                        path.stations[vertex].distance_mm - path.stations[last.vertex].distance_mm;
+                    let way_mm = path.distances_mm[vertex] - path.distances_mm[last.vertex];
                     way_mm - speed * (last.runs_s()[1] + 2.0 * self.weave.period_s())
                 }
-                None => path.stations[vertex].distance_mm,
+                None => path.distances_mm[vertex],
             };
-            let left_mm = path.length_mm() - path.stations[vertex].distance_mm;
+            let left_mm = path.length_mm() - path.distances_mm[vertex];
             let fits = straight_mm(path, vertex, false, before_mm) >= before_mm
                 && straight_mm(path, vertex, true, after_mm) >= after_mm
                 && room_mm >= runs_mm[0]

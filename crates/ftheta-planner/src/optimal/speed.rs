@@ -99,24 +99,24 @@ pub(super) fn profile(
 /// * `lump_mm`: slight turns within it are one
 fn turns(path: &Path, lump_mm: f64) -> Vec<Turn> {
     let mut first_mm = 0.0;
-    let stations = &path.stations;
-    let bend = |leg: usize| match path.curved {
-        true => angle(stations[leg].leaving, stations[leg + 1].arriving),
+    let bend = |leg: usize| match path.is_curved() {
+        true => angle(path.ways(leg)[1], path.ways(leg + 1)[0]),
         false => 0.0,
     };
-    let last = stations.len() - 1;
+    let last = path.vertices.len() - 1;
     let mut turns: Vec<Turn> = Vec::new();
-    for (index, station) in stations.iter().enumerate() {
+    for (index, &at_mm) in path.distances_mm.iter().enumerate() {
+        let [arriving, leaving] = path.ways(index);
         let corner_rad = match index {
             0 => 0.0,
             _ if index == last => 0.0,
-            _ => angle(station.arriving, station.leaving),
+            _ => angle(arriving, leaving),
         };
         let before = if index > 0 { bend(index - 1) } else { 0.0 };
         let after = if index < last { bend(index) } else { 0.0 };
         let angle_rad = corner_rad + 0.5 * (before + after);
         if angle_rad.abs() > TURN_MIN_RAD {
-            let turn = Turn { at_mm: station.distance_mm, angle_rad, corner_rad };
+            let turn = Turn { at_mm, angle_rad, corner_rad };
             match turns.last_mut() {
                 Some(last) if turn.at_mm - first_mm < lump_mm && last.lumps_with(&turn) => {
                     last.add(&turn);

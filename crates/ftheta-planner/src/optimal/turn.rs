@@ -66,14 +66,14 @@ impl Turn {
         (speed_mm_s, allowance): (f64, Allowance),
     ) -> Result<Option<Self>, PlanError> {
         let at = path.vertices[vertex];
-        let station = path.stations[vertex];
-        let theta = angle(station.arriving, station.leaving).abs();
+        let [arriving, leaving] = path.directions(vertex);
+        let theta = angle(arriving, leaving).abs();
         // Past a right angle the nearest point of the other leg is the corner.
         let sine = if theta < std::f64::consts::FRAC_PI_2 { theta.sin() } else { 1.0 };
         let band_mm =
             (allowance.contour_mm / sine).min(allowance.coverage_mm / (2.0 * (0.5 * theta).sin()));
         let mut sides = Vec::with_capacity(2);
-        for (end, direction) in [(End::Arrive, station.arriving), (End::Depart, station.leaving)] {
+        for (end, direction) in [(End::Arrive, arriving), (End::Depart, leaving)] {
             let (unit, mm_per_rad) = mirror_direction(machine, at, direction)?;
             let speed_rad_s = speed_mm_s / mm_per_rad;
             let Some(side) = corners.side(end, speed_rad_s, band_mm / mm_per_rad)? else {
@@ -202,32 +202,37 @@ pub(super) fn candidates(
     smoothing: &Smoothing,
     (miss_mm, change_mm_s): (f64, f64),
 ) -> Vec<usize> {
-    let stations = &path.stations;
+    // Twice the sine of half the angle, which both have.
+    let most =
+        (2.0 * GENTLE * miss_mm / (speed_mm_s * smoothing.mean_s)).min(change_mm_s / speed_mm_s);
     let sharp = |vertex: usize| {
-        // Of half the angle, since both directions have length 1.
-        let sine = 0.5 * (stations[vertex].leaving - stations[vertex].arriving).hypot();
-        sine * speed_mm_s * smoothing.mean_s > GENTLE * miss_mm
-            || 2.0 * sine * speed_mm_s > change_mm_s
+        let [arriving, leaving] = path.ways(vertex);
+        // The tangent of the angle, which is more, costs nothing.
+        let dot = arriving.dot(leaving);
+        let slight = dot > 0.0 && arriving.cross(leaving).abs() <= most * dot;
+        !slight && {
+            let [arriving, leaving] = path.directions(vertex);
+            (leaving - arriving).hypot() > most
+        }
     };
-    (1..stations.len() - 1).filter(|&vertex| sharp(vertex)).collect()
+    (1..path.vertices.len() - 1).filter(|&vertex| sharp(vertex)).collect()
 }
 
 /// How far a path is straight before or after a vertex, mm, up to `enough_mm`; past its ends it is.
 pub(super) fn straight_mm(path: &Path, vertex: usize, forwards: bool, enough_mm: f64) -> f64 {
-    let stations = &path.stations;
-    let at_mm = stations[vertex].distance_mm;
-    let direction = if forwards { stations[vertex].leaving } else { stations[vertex].arriving };
+    let at_mm = path.distances_mm[vertex];
+    let direction = path.ways(vertex)[usize::from(forwards)];
     let mut here = vertex;
     loop {
-        let way_mm = (stations[here].distance_mm - at_mm).abs();
-        let last = if forwards { here + 1 == stations.len() } else { here == 0 };
+        let way_mm = (path.distances_mm[here] - at_mm).abs();
+        let last = if forwards { here + 1 == path.vertices.len() } else { here == 0 };
         if last || way_mm >= enough_mm {
             return way_mm.max(enough_mm);
         }
         let next = if forwards { here + 1 } else { here - 1 };
         let leg = if forwards { here } else { next };
-        let bends = angle(direction, stations[leg].leaving).abs() > STRAIGHT_RAD
-            || angle(direction, stations[leg + 1].arriving).abs() > STRAIGHT_RAD;
+        let bends = angle(direction, path.ways(leg)[1]).abs() > STRAIGHT_RAD
+            || angle(direction, path.ways(leg + 1)[0]).abs() > STRAIGHT_RAD;
         if bends {
             return way_mm;
         }

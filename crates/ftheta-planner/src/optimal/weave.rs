@@ -154,9 +154,9 @@ impl<'a> Weave<'a> {
         let draft = &mut self.draft;
         let first_vertex = draft.vertices.len() as u32;
         draft.vertices.extend(&stretch.path.vertices);
-        let first_station = stretch.path.curved.then_some(draft.stations.len() as u32);
-        if stretch.path.curved {
-            draft.stations.extend(&stretch.path.stations);
+        let first_station = stretch.path.is_curved().then_some(draft.stations.len() as u32);
+        if stretch.path.is_curved() {
+            draft.stations.extend(stretch.path.stations());
         }
         let first_knot = draft.knots.len() as u32;
         draft.knots.extend(&stretch.knots);
