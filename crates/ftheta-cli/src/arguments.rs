@@ -122,7 +122,8 @@ pub struct Mark {
     #[arg(long, value_name = "N", default_value = "1")]
     pub seed: u64,
     /// Errors of the twin's plant that the planner does not know of: f1, kt relative, zeta
-    /// absolute, as in f1=+0.03,kt=-0.02,zeta=0.0025.
+    /// absolute, as in f1=+0.03,kt=-0.02,zeta=0.0025; what laser (laser_on_us, laser_off_us) and
+    /// focusing lens (lens_us) are late by.
     #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true,
           value_parser = mismatch, allow_hyphen_values = true)]
     pub mismatch: Mismatch,
@@ -414,7 +415,7 @@ fn number(text: &str) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err(format!("{value} is not finite")) }
 }
 
-/// Time by which light is late, ns, from µs.
+/// Time by which light or a lens is late, ns, from µs.
 fn lateness(late_us: f64) -> Result<i64, String> {
     Ok((within(late_us, -5000.0..=5000.0)? * 1e3).round() as i64)
 }
@@ -435,9 +436,11 @@ fn mismatch(text: &str) -> Result<Mismatch, String> {
             "zeta" => mismatch.zeta = Some(within(value, 1e-5..=0.5).map_err(named)?),
             "laser_on_us" => mismatch.late_ns[0] = lateness(value).map_err(named)?,
             "laser_off_us" => mismatch.late_ns[1] = lateness(value).map_err(named)?,
+            "lens_us" => mismatch.lens_late_ns = lateness(value).map_err(named)?,
             other => {
                 return Err(format!(
-                    "unknown key \"{other}\", known are f1, kt, zeta, laser_on_us, laser_off_us"
+                    "unknown key \"{other}\", known are f1, kt, zeta, laser_on_us, laser_off_us, \
+                     lens_us"
                 ));
             }
         }
@@ -458,14 +461,18 @@ mod tests {
     #[test]
     fn mismatch_is_read_or_refused() {
         let read = mismatch("f1=+0.03, kt=-0.02,zeta=0.0025").unwrap();
-        let expected = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025), late_ns: [0; 2] };
+        let expected = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025), ..Mismatch::default() };
         assert_eq!(read, expected);
         let read = mismatch("laser_on_us=85,laser_off_us=-0.5").unwrap();
         assert_eq!(read.late_ns, [85_000, -500]);
+        assert_eq!(mismatch("lens_us=200").unwrap().lens_late_ns, 200_000);
         assert_eq!(mismatch("").unwrap(), Mismatch::default());
         for (text, expected) in [
             ("f1", "\"f1\" is not of the form key=value"),
-            ("f2=1", "unknown key \"f2\", known are f1, kt, zeta, laser_on_us, laser_off_us"),
+            (
+                "f2=1",
+                "unknown key \"f2\", known are f1, kt, zeta, laser_on_us, laser_off_us, lens_us",
+            ),
             ("f1=nan", "NaN is not finite"),
             ("kt=0.6", "kt = 0.6 is outside -0.5 to 0.5"),
         ] {

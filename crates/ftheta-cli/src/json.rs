@@ -152,6 +152,9 @@ fn twin(score: &Score) -> Value {
     if let Some(ratios) = score.pulse_spacing_ratio {
         figures["pulse_spacing_ratio"] = spread(ratios);
     }
+    if let Some(focus) = score.focus_error_um {
+        figures["focus_error_um"] = json!({"max": focus.max, "p99": focus.p99});
+    }
     figures
 }
 

@@ -12,6 +12,9 @@ pub struct Block {
     /// What a driver that is sent voltages gets instead of words, one pair per tick; empty where
     /// words are sent.
     pub volts: Vec<[VoltageSample; 2]>,
+    /// Travel of the focusing lens from the middle of its range, mm, one per tick; empty for a head
+    /// without one. The lens is there after its lag.
+    pub lens_mm: Vec<f64>,
     /// Laser edges whose time lies within this block, in order; those whose light leads its signal
     /// come with the block in which the light does.
     pub edges: Vec<LaserEdge>,

@@ -11,6 +11,9 @@ pub struct Trace {
     pub first_index: u64,
     /// Beam centre, one point per step.
     pub points: Vec<TracePoint>,
+    /// Travel of the focusing lens at the end of each tick of the stretch, mm; empty for a head
+    /// without one.
+    pub lens_mm: Vec<f64>,
     /// Light that ended, or was cut at the end of the stretch, in order.
     pub light: Vec<Light>,
     /// Pulses of a pulsed laser, in order; a continuous one has none.

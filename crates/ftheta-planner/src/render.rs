@@ -1,6 +1,7 @@
 //! Renders a plan into blocks of output words: the only place where millimetres become codes.
 
 mod axes;
+mod lens;
 mod pulses;
 pub(crate) mod track;
 mod words;
@@ -13,6 +14,7 @@ use ftheta_model::space::DacCodes;
 use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::plan::Plan;
 use kurbo::{Point, Vec2};
+use lens::LensPath;
 use pulses::Triggers;
 use track::Track;
 use words::Words;
@@ -29,6 +31,7 @@ pub struct Renderer<'a> {
     plan: &'a Plan,
     words: Words<'a>,
     axes: Axes,
+    lens: Option<LensPath<'a>>,
     segment_index: usize,
     /// Samples of the segment already rendered.
     n_rendered: u32,
@@ -60,10 +63,20 @@ impl<'a> Renderer<'a> {
     }
 
     fn with_words(plan: &'a Plan, words: Words<'a>) -> Self {
+        let mirrors = Self::of_mirrors(plan, words);
+        match plan.machine.optics.focus {
+            Some(_) => Self { lens: LensPath::new(plan, mirrors.clone()), ..mirrors },
+            None => mirrors,
+        }
+    }
+
+    /// The same without a focusing lens.
+    fn of_mirrors(plan: &'a Plan, words: Words<'a>) -> Self {
         let mut renderer = Self {
             plan,
             words,
             axes: Axes::new(&plan.machine, plan.planner == Planner::Optimal),
+            lens: None,
             segment_index: 0,
             n_rendered: 0,
             cursor: Cursor::at(&plan.vertices, 0),
@@ -107,6 +120,7 @@ impl<'a> Renderer<'a> {
     pub fn next_block(&mut self, block: &mut Block) -> bool {
         block.first_index = self.next_index;
         block.words.clear();
+        block.lens_mm.clear();
         block.edges.clear();
         block.triggers_ns.clear();
         while block.words.len() < BLOCK_SAMPLES {
@@ -125,6 +139,9 @@ impl<'a> Renderer<'a> {
         self.next_index += block.words.len() as u64;
         self.axes.take_volts(&mut block.volts);
         self.words.correct_volts(&mut block.volts);
+        if let Some(lens) = &mut self.lens {
+            lens.push(block.words.len(), &mut block.lens_mm);
+        }
         self.push_edges(block);
         !block.words.is_empty()
     }

@@ -5,6 +5,7 @@ use crate::track::MarkTrack;
 use ftheta_model::plan::PlanDraft;
 use ftheta_model::space::FieldPoint;
 use ftheta_model::trace::{Light, Trace, TracePoint};
+use ftheta_physics::focus::lens_travel_mm;
 use kurbo::Point;
 use std::collections::VecDeque;
 
@@ -31,6 +32,9 @@ pub struct Score {
     /// Way of the beam between neighbouring pulses of an interval, over pen speed by pulse rate;
     /// `None` where there are no two pulses.
     pub pulse_spacing_ratio: Option<RatioSpread>,
+    /// Distance of the focus from the beam's place in the work plane, along the beam, over the
+    /// ticks with light; `None` for a head whose focus does not move.
+    pub focus_error_um: Option<Tail>,
     /// Energy emitted off the marks over all energy.
     pub stray_energy_ratio: f64,
     /// First light to last light, s.
@@ -205,6 +209,7 @@ impl<'a> Scorer<'a> {
         };
         let beam = BeamAt { trace, last: self.last };
         let mut at_ns = light.on_ns;
+        self.take_focus(trace, &light);
         let track = self
             .track
             .get_or_insert_with(|| MarkTrack::new(plan, light.index, mark, beam.at(at_ns)));
@@ -218,6 +223,26 @@ impl<'a> Scorer<'a> {
             };
             self.tally.take(track, beam.at(next_ns), step);
             at_ns = next_ns;
+        }
+    }
+
+    /// Measures how far the focus is from the lit beam at ticks.
+    fn take_focus(&mut self, trace: &Trace, light: &Light) {
+        let machine = &self.plan.machine;
+        let (Some(focus), false) = (&machine.optics.focus, trace.lens_mm.is_empty()) else {
+            return;
+        };
+        let beam = BeamAt { trace, last: self.last };
+        let period_ns = u64::from(machine.output.period_ns);
+        let before = trace.first_index * trace.step_ns / period_ns;
+        for tick in light.on_ns.div_ceil(period_ns)..=light.off_ns / period_ns {
+            // Each stretch has the ends of its ticks.
+            let at = tick.checked_sub(before + 1).and_then(|i| trace.lens_mm.get(i as usize));
+            if let Some(lens_mm) = at {
+                let place = beam.at(tick * period_ns).into();
+                let wanted_mm = lens_travel_mm(&machine.optics, place).unwrap_or(0.0);
+                self.tally.take_focus(1e3 * (focus.magnification * (lens_mm - wanted_mm)).abs());
+            }
         }
     }
 

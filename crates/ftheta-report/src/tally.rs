@@ -36,6 +36,7 @@ pub struct Tally {
     end_um: Histogram,
     dose: Histogram,
     pulse_spacing: Histogram,
+    focus_um: Histogram,
     dose_bars: Vec<f64>,
     stray_j: f64,
     energy_j: f64,
@@ -67,6 +68,7 @@ impl Tally {
             end_um: Histogram::of_errors_um(),
             dose: Histogram::new(1e-4, 1e4, 10),
             pulse_spacing: Histogram::new(1e-4, 1e4, 10),
+            focus_um: Histogram::of_errors_um(),
             dose_bars: vec![0.0; N_DOSE_BARS],
             stray_j: 0.0,
             energy_j: 0.0,
@@ -101,6 +103,11 @@ impl Tally {
     /// Counts the distance of two pulses, over what the pen asks for.
     pub fn take_pulse_spacing(&mut self, ratio: f64) {
         self.pulse_spacing.add(ratio, 1.0);
+    }
+
+    /// Counts how far the focus is from the lit beam, once a tick.
+    pub fn take_focus(&mut self, error_um: f64) {
+        self.focus_um.add(error_um, 1.0);
     }
 
     /// Counts a mark that saw no light.
@@ -183,6 +190,7 @@ impl Tally {
             end_error_um: tail(&self.end_um),
             dose_ratio: spread(&self.dose),
             pulse_spacing_ratio: spread(&self.pulse_spacing),
+            focus_error_um: (self.focus_um.total() > 0.0).then(|| tail(&self.focus_um)),
             stray_energy_ratio: match self.energy_j > 0.0 {
                 true => self.stray_j / self.energy_j,
                 false => 0.0,

@@ -6,6 +6,7 @@ mod beam;
 mod draw;
 mod exposure;
 pub mod hidden_head;
+mod lens;
 mod light;
 pub mod mismatch;
 pub mod open_loop;

@@ -13,6 +13,8 @@ pub struct Mismatch {
     pub zeta: Option<f64>,
     /// Light that appears, and goes, so much later than the machine file says, ns.
     pub late_ns: [i64; 2],
+    /// Lag of the focusing lens beside the machine file's, ns.
+    pub lens_late_ns: i64,
 }
 
 impl Mismatch {

@@ -2,6 +2,7 @@
 
 use crate::beam::{Beam, Command};
 use crate::exposure::Exposure;
+use crate::lens::LensAxis;
 use crate::light::LaserState;
 use crate::mismatch::Mismatch;
 use crate::pulses::{Pulses, Until};
@@ -49,6 +50,7 @@ pub struct Twin {
     laser: LaserState,
     pulses: Pulses,
     exposure: Exposure,
+    lens: Option<LensAxis>,
     trace: Trace,
     last: FieldPoint,
     state_stride: u64,
@@ -66,6 +68,7 @@ pub struct Twin {
 struct Tick {
     word: DacCodes,
     volts: Option<[VoltageSample; 2]>,
+    lens_mm: Option<f64>,
 }
 
 impl Twin {
@@ -87,6 +90,7 @@ impl Twin {
             laser: LaserState::new(latencies_ns[0], latencies_ns[1]),
             pulses: Pulses::new(&machine.laser, latencies_ns[0], step_ns),
             exposure: Exposure::new(options.pixel_mm),
+            lens: LensAxis::new(machine, options.mismatch.lens_late_ns as f64 * 1e-9),
             trace: Trace { points: vec![TracePoint::default()], ..trace },
             last: FieldPoint::default(),
             state_stride: options.state_stride.max(1),
@@ -137,7 +141,7 @@ impl Twin {
     }
 
     /// Plays one tick.
-    fn play(&mut self, Tick { word, volts }: Tick) {
+    fn play(&mut self, Tick { word, volts, lens_mm }: Tick) {
         let angles_rad = [f64::from(word.x), f64::from(word.y)].map(|w| w * self.rad_per_word);
         let command = volts.as_ref().map_or(Command::Angles(angles_rad), Command::Volts);
         let mut places = [FieldPoint::default(); 100];
@@ -156,6 +160,9 @@ impl Twin {
             self.trace.points.push(place.into());
             self.last = place;
             now_ns = end_ns;
+        }
+        if let (Some(lens), Some(command_mm)) = (&mut self.lens, lens_mm) {
+            self.trace.lens_mm.push(lens.tick(command_mm));
         }
         self.next_index += 1;
         if self.next_index.is_multiple_of(self.state_stride) {
@@ -216,7 +223,8 @@ impl SampleSink for Twin {
         block.edges.iter().for_each(|&edge| self.laser.take(edge));
         block.triggers_ns.iter().for_each(|&time_ns| self.pulses.take(time_ns));
         for (index, &word) in block.words.iter().enumerate() {
-            self.held.push_back(Tick { word, volts: block.volts.get(index).copied() });
+            let (volts, lens_mm) = (block.volts.get(index), block.lens_mm.get(index));
+            self.held.push_back(Tick { word, volts: volts.copied(), lens_mm: lens_mm.copied() });
             if self.held.len() > self.n_held
                 && let Some(tick) = self.held.pop_front()
             {

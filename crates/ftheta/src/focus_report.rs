@@ -22,6 +22,14 @@ pub struct FocusReport {
     pub warnings: Vec<Warning>,
 }
 
+/// Part by which the spot is larger where the focus is off by this, mm along the beam.
+pub fn spot_growth(machine: &Machine, defocus_mm: f64) -> f64 {
+    let laser = &machine.laser;
+    let spot_mm = laser.spot_diameter_mm;
+    let range_mm = rayleigh_range_mm(laser.wavelength_nm, laser.beam_quality_m2, spot_mm);
+    defocused_diameter_mm(spot_mm, range_mm, defocus_mm) / spot_mm - 1.0
+}
+
 /// Spot and focus over the field of a machine.
 pub fn report(machine: &Machine) -> FocusReport {
     let (laser, optics) = (&machine.laser, &machine.optics);

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::atlas_store::AtlasStore;
+use crate::focus_report::spot_growth;
 use crate::planning::Planning;
 use crate::promise::Promise;
 use ftheta_model::block::{Block, SampleSink};
@@ -209,6 +210,9 @@ pub(crate) fn lay_out(
 /// Stray energy from which on it is worth a warning.
 const STRAY_WARNING: f64 = 0.01;
 
+/// Part by which the spot may be larger than in focus without a word.
+const SPOT_GROWTH_WARNING: f64 = 0.05;
+
 /// Part of a pen's speed below which a mark is called slower.
 const SLOWER_WARNING: f64 = 0.95;
 
@@ -223,6 +227,13 @@ fn shortcomings(plan: &PlanDraft, score: &Score) -> Vec<Warning> {
     if score.stray_energy_ratio > STRAY_WARNING {
         let percent = score.stray_energy_ratio * 100.0;
         warn(format!("{percent:.1} % of the energy falls farther off its mark than the tolerance"));
+    }
+    if let Some(focus) = score.focus_error_um {
+        let (off_mm, growth) = (1e-3 * focus.max, spot_growth(&plan.machine, 1e-3 * focus.max));
+        if growth > SPOT_GROWTH_WARNING {
+            let percent = growth * 100.0;
+            warn(format!("the focus is off by {off_mm:.2} mm, the spot {percent:.0} % larger"));
+        }
     }
     warnings.extend(slower_marks(plan));
     let mut warn = |message: String| warnings.push(Warning::new("result", message));

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::against::{Against, WAYS};
+use crate::focus_report::spot_growth;
 use crate::mark::{MarkOptions, Marked};
 use crate::output::Output;
 use crate::promise::Promise;
@@ -114,6 +115,11 @@ fn settings_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
     }
     if about.options.head.is_some() {
         rows.push(("Head of the twin", "with mounting errors".into()));
+    }
+    if let Some(focus) = marked.score.focus_error_um {
+        let growth = 100.0 * spot_growth(machine, 1e-3 * focus.max);
+        let text = format!("off by {:.3} mm at most, spot +{growth:.1} %", 1e-3 * focus.max);
+        rows.push(("Focus on the twin", text));
     }
     let rows = rows.into_iter().map(|(key, value)| (key.to_owned(), value));
     let planned = match marked.plan.planner {

@@ -6,7 +6,8 @@ use ftheta::atlas_store::AtlasStore;
 use ftheta::field::angles_of;
 use ftheta::formats::points::Place;
 use ftheta::formats::{machine, svg};
-use ftheta::mark::{MarkOptions, Marked, mark};
+use ftheta::mark::{MarkOptions, Marked, mark, play};
+use ftheta::model::block::Block;
 use ftheta::model::machine::{Drive, Focus, Machine};
 use ftheta::model::plan::{PlanDraft, Planner};
 use ftheta::model::recipe::Recipe;
@@ -14,7 +15,9 @@ use ftheta::model::space::FieldPoint;
 use ftheta::physics::audit::AuditError;
 use ftheta::physics::focus::lens_travel_mm;
 use ftheta::physics::plan::Plan;
+use ftheta::planner::render::Renderer;
 use ftheta::toolpath::lay::Order;
+use ftheta::twin::mismatch::Mismatch;
 use kurbo::{ParamCurve, Point};
 use std::sync::LazyLock;
 use tempfile::TempDir;
@@ -82,6 +85,64 @@ fn mirrors_wait_for_the_lens() {
     fixed.optics.focus = None;
     let quick = run(&fixed, None).unwrap().plan;
     assert!(PLAN.n_samples() > quick.n_samples() + 5000, "{}", quick.n_samples());
+}
+
+/// All commands of the lens.
+fn lens_mm(plan: &Plan) -> Vec<f64> {
+    let (mut renderer, mut block, mut all) = (Renderer::new(plan), Block::default(), Vec::new());
+    while renderer.next_block(&mut block) {
+        all.extend_from_slice(&block.lens_mm);
+    }
+    all
+}
+
+#[test]
+fn the_lens_is_told_within_its_limits() {
+    let plan = &*PLAN;
+    let (lens_mm, machine) = (lens_mm(plan), &plan.machine);
+    assert_eq!(lens_mm.len() as u64, plan.n_samples());
+    let (focus, tick_s) = (machine.optics.focus.as_ref().unwrap(), machine.output.period_s());
+    let centre_mm = lens_travel_mm(&machine.optics, FieldPoint::default()).unwrap();
+    assert!((lens_mm[0] - centre_mm).abs() < 1e-5);
+    assert!((lens_mm[lens_mm.len() - 1] - centre_mm).abs() < 1e-5);
+    let most = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
+    let speed = most(&mut lens_mm.windows(2).map(|pair| (pair[1] - pair[0]) / tick_s));
+    let bends = lens_mm.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]);
+    let acceleration = most(&mut bends.map(|bend| bend / (tick_s * tick_s)));
+    assert!(most(&mut lens_mm.iter().copied()) <= focus.travel_mm);
+    assert!((0.5..=1.0).contains(&(speed / focus.speed_max_mm_s)), "{speed}");
+    assert!(acceleration <= focus.acceleration_max_mm_s2, "{acceleration}");
+    // The same in blocks of another plan's renderer, and none for a head without a lens.
+    let again = Renderer::new(plan).for_plan(plan);
+    let (mut again, mut block) = (again, Block::default());
+    again.next_block(&mut block);
+    assert_eq!(block.lens_mm[..], lens_mm[..block.lens_mm.len()]);
+}
+
+/// What is left is what the lens' axis makes of acceleration, a·lag²/4; far less than the Rayleigh
+/// range, unlike a lens that is later than its file says.
+#[test]
+fn the_focus_is_on_the_lit_beam() {
+    let machine = head();
+    let focus = machine.optics.focus.as_ref().unwrap();
+    let most_mm = 0.25 * focus.acceleration_max_mm_s2 * focus.lag_s.powi(2) * focus.magnification;
+    let off_mm = |lens_late_ns| {
+        let mismatch = Mismatch { lens_late_ns, ..Mismatch::default() };
+        let options = MarkOptions { mismatch, ..MarkOptions::default() };
+        let score = play(&PLAN, &options, &mut |_| {}).unwrap().score;
+        1e-3 * score.focus_error_um.unwrap().max
+    };
+    let [on_time_mm, late_mm] = [0, 700_000].map(off_mm);
+    assert!(on_time_mm > 0.0 && on_time_mm < most_mm, "{on_time_mm} of {most_mm} mm");
+    assert!(late_mm > 0.3, "{late_mm}");
+    let mut black_box = head();
+    black_box.output.drive = Drive::BlackBox;
+    let black_box = run(&black_box, None).unwrap().score.focus_error_um.unwrap().max;
+    assert!(1e-3 * black_box < most_mm, "{black_box} µm");
+    let mut fixed = head();
+    fixed.optics.focus = None;
+    let fixed = run(&fixed, None).unwrap();
+    assert!(fixed.score.focus_error_um.is_none() && lens_mm(&fixed.plan).is_empty());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::progress::Progress;
 use crate::screen::{note, say};
 use ftheta::against::{Against, Column, WAYS, against};
 use ftheta::atlas_store::AtlasStore;
+use ftheta::focus_report::spot_growth;
 use ftheta::formats::svg::SvgOptions;
 use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::warning::Warning;
@@ -185,6 +186,15 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
             pulses.p01,
             pulses.p99,
             pulses.min
+        );
+    }
+    if let Some(focus) = score.focus_error_um {
+        let growth = spot_growth(&marked.plan.machine, 1e-3 * focus.max);
+        say!(
+            "focus    off by {:.3} mm max, {:.3} mm p99: spot at most {:.1} % larger",
+            1e-3 * focus.max,
+            1e-3 * focus.p99,
+            100.0 * growth
         );
     }
     for (kind, path) in files {
