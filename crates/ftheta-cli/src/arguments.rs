@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod calibrate_delay;
 pub mod field;
+mod mismatch;
 pub mod pattern;
 pub mod photograph;
 
@@ -15,6 +16,7 @@ use ftheta::model::plan::Planner;
 use ftheta::planner::optimal::Corner;
 use ftheta::toolpath::lay::Order;
 use ftheta::twin::mismatch::Mismatch;
+use mismatch::mismatch;
 use pattern::Pattern;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -133,6 +135,10 @@ pub struct Mark {
     /// Correction table of the head, as `ftheta calibrate field` writes it.
     #[arg(long, value_name = "TABLE")]
     pub table: Option<PathBuf>,
+    /// Height of the work plane above the nominal one, towards the head, mm; the machine file's
+    /// `plane_mm` if not given.
+    #[arg(long, value_name = "Z", value_parser = height, allow_hyphen_values = true)]
+    pub z_mm: Option<f64>,
     /// Mark on a twin whose head has hidden errors, drawn from this seed.
     #[arg(long, value_name = "SEED")]
     pub head: Option<u64>,
@@ -415,37 +421,9 @@ fn number(text: &str) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err(format!("{value} is not finite")) }
 }
 
-/// Time by which light or a lens is late, ns, from µs.
-fn lateness(late_us: f64) -> Result<i64, String> {
-    Ok((within(late_us, -5000.0..=5000.0)? * 1e3).round() as i64)
-}
-
-/// Reads `f1=+0.03,kt=-0.02,zeta=0.0025,laser_on_us=85,laser_off_us=60`.
-fn mismatch(text: &str) -> Result<Mismatch, String> {
-    let mut mismatch = Mismatch::default();
-    for part in text.split(',').filter(|part| !part.trim().is_empty()) {
-        let (key, value) = part
-            .split_once('=')
-            .ok_or_else(|| format!("\"{part}\" is not of the form key=value"))?;
-        let value = number(value)?;
-        let key = key.trim();
-        let named = |message: String| format!("{key} = {message}");
-        match key {
-            "f1" => mismatch.f1 = within(value, -0.5..=0.5).map_err(named)?,
-            "kt" => mismatch.kt = within(value, -0.5..=0.5).map_err(named)?,
-            "zeta" => mismatch.zeta = Some(within(value, 1e-5..=0.5).map_err(named)?),
-            "laser_on_us" => mismatch.late_ns[0] = lateness(value).map_err(named)?,
-            "laser_off_us" => mismatch.late_ns[1] = lateness(value).map_err(named)?,
-            "lens_us" => mismatch.lens_late_ns = lateness(value).map_err(named)?,
-            other => {
-                return Err(format!(
-                    "unknown key \"{other}\", known are f1, kt, zeta, laser_on_us, laser_off_us, \
-                     lens_us"
-                ));
-            }
-        }
-    }
-    Ok(mismatch)
+/// Height of a work plane, mm.
+fn height(text: &str) -> Result<f64, String> {
+    within(number(text)?, -1e4..=1e4)
 }
 
 #[cfg(test)]
@@ -456,28 +434,6 @@ mod tests {
     #[test]
     fn command_line_is_consistent() {
         Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn mismatch_is_read_or_refused() {
-        let read = mismatch("f1=+0.03, kt=-0.02,zeta=0.0025").unwrap();
-        let expected = Mismatch { f1: 0.03, kt: -0.02, zeta: Some(0.0025), ..Mismatch::default() };
-        assert_eq!(read, expected);
-        let read = mismatch("laser_on_us=85,laser_off_us=-0.5").unwrap();
-        assert_eq!(read.late_ns, [85_000, -500]);
-        assert_eq!(mismatch("lens_us=200").unwrap().lens_late_ns, 200_000);
-        assert_eq!(mismatch("").unwrap(), Mismatch::default());
-        for (text, expected) in [
-            ("f1", "\"f1\" is not of the form key=value"),
-            (
-                "f2=1",
-                "unknown key \"f2\", known are f1, kt, zeta, laser_on_us, laser_off_us, lens_us",
-            ),
-            ("f1=nan", "NaN is not finite"),
-            ("kt=0.6", "kt = 0.6 is outside -0.5 to 0.5"),
-        ] {
-            assert_eq!(mismatch(text).unwrap_err(), expected);
-        }
     }
 }
 

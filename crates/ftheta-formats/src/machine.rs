@@ -143,7 +143,12 @@ fn optics(section: &Section<'_>) -> Result<Optics, TomlError> {
         field_mm: section.need("field_mm", 0.1..=1e4)?,
         aperture_mm: section.number("aperture_mm", 0.1..=500.0)?,
         focus: None,
+        plane_mm: 0.0,
     };
+    let plane_mm = section.number("plane_mm", -1e5..=1e5)?.unwrap_or(0.0);
+    optics = optics
+        .at_height(plane_mm)
+        .ok_or_else(|| section.refuse("plane_mm", "less than working_distance_mm"))?;
     optics.focus = section.section("focus", |inner| focus(inner, &optics))?;
     if optics.focus.is_some() && matches!(optics.lens, Lens::FTheta { .. }) {
         return Err(section.refuse("kind", "\"post-objective\", the only kind with [optics.focus]"));

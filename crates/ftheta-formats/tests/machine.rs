@@ -158,6 +158,23 @@ fn axes_that_cannot_be_steered_are_refused() {
 const DYNAMIC_FOCUS: &str = include_str!("../../../gallery/dynamic-focus.toml");
 
 #[test]
+fn a_work_plane_survives_a_round_trip() {
+    let text = DYNAMIC_FOCUS.replace("travel_mm = 5.0", "travel_mm = 11.0");
+    let raised = text.replace("field_mm = 280.0", "field_mm = 280.0\nplane_mm = 20.0");
+    let machine = machine::read("m.toml", &raised).unwrap();
+    assert_eq!(machine.optics.plane_mm, 20.0);
+    assert_eq!(machine::read("m.toml", &machine::to_toml(&machine)).unwrap(), machine);
+    let error = |plane: &str| {
+        let text =
+            text.replace("field_mm = 280.0", &format!("field_mm = 280.0\nplane_mm = {plane}"));
+        machine::read("m.toml", &text).unwrap_err().to_string()
+    };
+    assert!(error("460.0").contains("plane_mm"), "{}", error("460.0"));
+    // There the lens would have to be at -11.2 mm.
+    assert!(error("25.0").contains("travel_mm"), "{}", error("25.0"));
+}
+
+#[test]
 fn a_focusing_lens_survives_a_round_trip() {
     let machine = machine::read("dynamic-focus.toml", DYNAMIC_FOCUS).unwrap();
     let focus = machine.optics.focus.as_ref().unwrap();

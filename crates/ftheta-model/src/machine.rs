@@ -117,6 +117,23 @@ pub struct Optics {
     /// The lens that keeps a post-objective head's focus in the work plane; `None` for a fixed
     /// focus.
     pub focus: Option<Focus>,
+    /// Height of the work plane above the nominal one, towards the head, mm. All places of the
+    /// field are in it.
+    pub plane_mm: f64,
+}
+
+impl Optics {
+    /// The same over a work plane of another height; `None` where there is no room for it.
+    ///
+    /// Behind an F-theta lens the height moves the focus alone; what else it does is left to the
+    /// planes of a correction table.
+    pub fn at_height(&self, plane_mm: f64) -> Option<Self> {
+        let fits = match self.lens {
+            Lens::PostObjective { working_distance_mm, .. } => working_distance_mm > plane_mm,
+            Lens::FTheta { .. } => true,
+        };
+        (fits && plane_mm.is_finite()).then(|| Self { plane_mm, ..self.clone() })
+    }
 }
 
 /// A lens in front of the mirrors that moves the focus, and its axis (dynamic focus).

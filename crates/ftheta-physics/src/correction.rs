@@ -22,6 +22,8 @@ pub struct CorrectionTable {
     about: About,
     planes: Vec<CorrectionPlane>,
     drift: Drift,
+    /// Height of the work plane at hand, mm.
+    z_mm: f64,
 }
 
 /// Where a table comes from.
@@ -186,7 +188,7 @@ impl CorrectionTable {
             below_mm = plane.z_mm;
             plane.check()?;
         }
-        Ok(Self { about, planes, drift })
+        Ok(Self { about, planes, drift, z_mm: 0.0 })
     }
 
     /// A table of the nominal work plane alone, of which nothing has drifted.
@@ -218,10 +220,18 @@ impl CorrectionTable {
         Self { drift, ..self }
     }
 
-    /// Corrected from nominal angles in the nominal work plane, rad.
+    /// The same table for a work plane at another height, mm, instead of the nominal one.
+    ///
+    /// * `z_mm`: beyond the planes it counts as that of the outermost one
+    #[must_use]
+    pub fn at_height(self, z_mm: f64) -> Self {
+        Self { z_mm, ..self }
+    }
+
+    /// Corrected from nominal angles in the work plane at hand, rad.
     #[inline]
     pub fn angles(&self, nominal_rad: [f64; 2]) -> [f64; 2] {
-        self.angles_at(nominal_rad, 0.0)
+        self.angles_at(nominal_rad, self.z_mm)
     }
 
     /// Corrected from nominal angles at a height of the work plane, rad.
@@ -242,10 +252,10 @@ impl CorrectionTable {
         [0, 1].map(|axis| gain[axis] * corrected[axis] + offset_rad[axis])
     }
 
-    /// Slopes of the corrected by the nominal angles, in the nominal work plane: rows corrected x
+    /// Slopes of the corrected by the nominal angles, in the work plane at hand: rows corrected x
     /// and y, columns nominal x and y.
     pub fn slopes(&self, nominal_rad: [f64; 2]) -> [[f64; 2]; 2] {
-        let (below, share) = between(&self.planes, 0.0);
+        let (below, share) = between(&self.planes, self.z_mm);
         let low = self.planes[below].angles.slopes(nominal_rad);
         let high = self.planes.get(below + 1).map(|plane| plane.angles.slopes(nominal_rad));
         [0, 1].map(|row| {
@@ -265,7 +275,7 @@ impl CorrectionTable {
         // The best node near by is a start even where the axes are swapped.
         let distance =
             |value: [f64; 2]| (value[0] - corrected_rad[0]).hypot(value[1] - corrected_rad[1]);
-        let (below, _) = between(&self.planes, 0.0);
+        let (below, _) = between(&self.planes, self.z_mm);
         let nodes = self.planes[below].angles.nodes();
         let start = nodes.min_by(|a, b| distance(a.2).total_cmp(&distance(b.2)))?;
         let mut nominal = [start.0, start.1];

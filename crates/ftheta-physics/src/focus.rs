@@ -62,9 +62,10 @@ pub fn truncated_share(beam_diameter_mm: f64, aperture_mm: f64) -> f64 {
 /// Along the second mirror's coordinate, where the way grows fastest, as far as the field goes;
 /// then along the field's edge. Exact.
 pub fn sharp_radius_mm(optics: &Optics, range_mm: f64) -> Option<f64> {
-    let Lens::PostObjective { mirror_distance_mm: e, working_distance_mm: d } = optics.lens else {
+    let Lens::PostObjective { mirror_distance_mm: e, working_distance_mm } = optics.lens else {
         return None;
     };
+    let d = working_distance_mm - optics.plane_mm;
     let half_mm = 0.5 * optics.field_mm;
     let straight_mm = (range_mm * (2.0 * d + range_mm)).sqrt();
     if straight_mm <= half_mm {
@@ -76,17 +77,18 @@ pub fn sharp_radius_mm(optics: &Optics, range_mm: f64) -> Option<f64> {
 }
 
 /// Focus shift at which the lens stands in the middle of its travel, mm: with a balanced lens half
-/// of what the field's corners need.
+/// of what the corners of the nominal work plane need.
 pub fn middle_shift_mm(optics: &Optics, focus: &Focus) -> f64 {
-    if !focus.balanced {
+    let Lens::PostObjective { mirror_distance_mm: e, working_distance_mm: d } = optics.lens else {
         return 0.0;
-    }
+    };
     let half_mm = 0.5 * optics.field_mm;
-    0.5 * path_difference_mm(optics, FieldPoint::new(half_mm, half_mm))
+    let corner_mm = || (e + d.hypot(half_mm)).hypot(half_mm) - (e + d);
+    if focus.balanced { 0.5 * corner_mm() } else { 0.0 }
 }
 
 /// Travel of the lens, from the middle of its range, that moves the focus away from the head by
-/// `shift_mm` from where it is in the field's centre, mm.
+/// `shift_mm` from the centre of the nominal work plane, mm.
 pub fn travel_of_shift_mm(optics: &Optics, focus: &Focus, shift_mm: f64) -> f64 {
     (shift_mm - middle_shift_mm(optics, focus)) / focus.magnification
 }
@@ -98,15 +100,17 @@ pub fn travel_of_shift_mm(optics: &Optics, focus: &Focus, shift_mm: f64) -> f64 
 /// Closed form, 1e-12 mm against a ray trace of the ideal head.
 pub fn lens_travel_mm(optics: &Optics, place: FieldPoint) -> Option<f64> {
     let focus = optics.focus.as_ref()?;
-    Some(travel_of_shift_mm(optics, focus, path_difference_mm(optics, place)))
+    let shift_mm = path_difference_mm(optics, place) - optics.plane_mm;
+    Some(travel_of_shift_mm(optics, focus, shift_mm))
 }
 
 /// How [`lens_travel_mm`] changes with the place, mm per mm in x and y.
 pub fn lens_gradient(optics: &Optics, place: FieldPoint) -> Option<Vec2> {
     let focus = optics.focus.as_ref()?;
-    let Lens::PostObjective { mirror_distance_mm: e, working_distance_mm: d } = optics.lens else {
+    let Lens::PostObjective { mirror_distance_mm: e, working_distance_mm } = optics.lens else {
         return Some(Vec2::ZERO);
     };
+    let d = working_distance_mm - optics.plane_mm;
     let (u, v) = match optics.first_mirror {
         Axis::X => (place.x_mm, place.y_mm),
         Axis::Y => (place.y_mm, place.x_mm),
@@ -128,6 +132,6 @@ pub fn field_travel_mm(optics: &Optics, focus: &Focus) -> f64 {
     let corner_mm = path_difference_mm(optics, FieldPoint::new(half_mm, half_mm));
     [0.0, corner_mm]
         .into_iter()
-        .map(|shift_mm| travel_of_shift_mm(optics, focus, shift_mm).abs())
+        .map(|shift_mm| travel_of_shift_mm(optics, focus, shift_mm - optics.plane_mm).abs())
         .fold(0.0, f64::max)
 }

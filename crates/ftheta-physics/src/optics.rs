@@ -28,7 +28,7 @@ pub fn field_from_angles(optics: &Optics, angles: MirrorAngles) -> FieldPoint {
     let (u, v) = match &optics.lens {
         Lens::FTheta { coefficients_mm } => ftheta_forward(coefficients_mm, first, second),
         Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
-            post_forward(*mirror_distance_mm, *working_distance_mm, first, second)
+            post_forward(*mirror_distance_mm, working_distance_mm - optics.plane_mm, first, second)
         }
     };
     match optics.first_mirror {
@@ -51,7 +51,7 @@ pub fn angles_from_field(optics: &Optics, place: FieldPoint) -> Option<MirrorAng
     let (first, second) = match &optics.lens {
         Lens::FTheta { coefficients_mm } => ftheta_inverse(coefficients_mm, u, v)?,
         Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
-            post_inverse(*mirror_distance_mm, *working_distance_mm, u, v)
+            post_inverse(*mirror_distance_mm, working_distance_mm - optics.plane_mm, u, v)
         }
     };
     Some(match optics.first_mirror {
@@ -65,7 +65,9 @@ pub fn angles_from_field(optics: &Optics, place: FieldPoint) -> Option<MirrorAng
 pub fn scale_mm_per_rad(optics: &Optics) -> f64 {
     match &optics.lens {
         Lens::FTheta { coefficients_mm } => 2.0 * coefficients_mm[0],
-        Lens::PostObjective { working_distance_mm, .. } => 2.0 * working_distance_mm,
+        Lens::PostObjective { working_distance_mm, .. } => {
+            2.0 * (working_distance_mm - optics.plane_mm)
+        }
     }
 }
 
@@ -142,7 +144,8 @@ pub fn path_difference_mm(optics: &Optics, place: FieldPoint) -> f64 {
     };
     match &optics.lens {
         Lens::FTheta { .. } => 0.0,
-        Lens::PostObjective { mirror_distance_mm: e, working_distance_mm: d } => {
+        Lens::PostObjective { mirror_distance_mm: e, working_distance_mm } => {
+            let d = working_distance_mm - optics.plane_mm;
             (e + d.hypot(v)).hypot(u) - (e + d)
         }
     }

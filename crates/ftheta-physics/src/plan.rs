@@ -241,6 +241,10 @@ impl Feed {
                 self.number(*working_distance_mm);
             }
         }
+        if optics.plane_mm != 0.0 {
+            self.text("plane");
+            self.number(optics.plane_mm);
+        }
         // A head without such a lens keeps the ids that it had before there were any.
         if let Some(focus) = &optics.focus {
             self.text("focus");

@@ -31,6 +31,7 @@ fn lens(coefficients_mm: Vec<f64>, field_mm: f64) -> Optics {
         field_mm,
         aperture_mm: None,
         focus: None,
+        plane_mm: 0.0,
     }
 }
 
@@ -38,7 +39,14 @@ fn post(case: &Value) -> Optics {
     let number = |key: &str| case[key].as_f64().unwrap();
     let lens =
         Lens::PostObjective { mirror_distance_mm: number("e"), working_distance_mm: number("d") };
-    Optics { lens, first_mirror: Axis::X, field_mm: 300.0, aperture_mm: None, focus: None }
+    Optics {
+        lens,
+        first_mirror: Axis::X,
+        field_mm: 300.0,
+        aperture_mm: None,
+        focus: None,
+        plane_mm: 0.0,
+    }
 }
 
 /// Forward to 1e-9 mm and back to 1e-12 rad over all rows of a case.
@@ -155,6 +163,7 @@ fn inverse_table_is_within_a_nanometre() {
         field_mm: 110.0,
         aperture_mm: None,
         focus: None,
+        plane_mm: 0.0,
     };
     let ideal = lens(vec![160.0], 120.0);
     let all =

@@ -73,6 +73,23 @@ pub enum PlanError {
         /// Place, mm.
         y_mm: f64,
     },
+    /// A place that the focusing lens cannot put the focus on.
+    #[error(
+        "{place}: ({x_mm:.3}, {y_mm:.3}) mm needs the focusing lens at {travel_mm:.3} mm, the limit \
+         is ±{limit_mm} mm"
+    )]
+    Focus {
+        /// Mark.
+        place: String,
+        /// Place, mm.
+        x_mm: f64,
+        /// Place, mm.
+        y_mm: f64,
+        /// Travel of the lens, mm.
+        travel_mm: f64,
+        /// Greatest travel, mm.
+        limit_mm: f64,
+    },
     /// Motion that the angles leave no room for.
     #[error("{place}: the mirrors' angles leave no room to come to it at its speed")]
     NoRoom {
@@ -117,6 +134,11 @@ impl PlanError {
             Self::Unreachable { x_mm, y_mm } => {
                 ("optics".into(), format!("({x_mm:.3}, {y_mm:.3}) mm"), "the lens".into())
             }
+            Self::Focus { place, travel_mm, limit_mm, .. } => (
+                format!("{place}: focusing lens"),
+                format!("{travel_mm:.3} mm"),
+                format!("±{limit_mm} mm"),
+            ),
             Self::NoRoom { place } => (place.clone(), "no motion".into(), "mirror angle".into()),
             Self::Immovable => ("scanner".into(), "immovable".into(), "movable".into()),
             Self::Jump(error) => error.fault(),

@@ -35,6 +35,7 @@ use glide::Glide;
 use heat::Heat;
 use join::joined;
 use kurbo::Point;
+use lens::LensAxis;
 use marking::Marking;
 use smoothing::Smoothing;
 use std::num::NonZero;
@@ -237,6 +238,9 @@ impl<'a> OptimalPlanner<'a> {
         }
         pens.iter().try_for_each(|pen| check_pen(pen, self.machine, f64::INFINITY))?;
         let marks = joined(marks, self.options.tolerance_mm);
+        if let Some(lens) = LensAxis::new(self.machine) {
+            lens.check(&marks, self.options.tolerance_mm)?;
+        }
         let mut marking = self.marking(pens, marks.len());
         marking.all(marks, [true; 2])?;
         marking.weave.rest_in_centre(lead_out_ticks(self.machine, self.lag_s));

@@ -103,7 +103,8 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Corrects all words and voltages by a table, for the head as it really is.
+    /// Corrects all words and voltages by a table, for the head as it really is over the plan's
+    /// work plane.
     #[must_use]
     pub fn correct_by(mut self, table: &CorrectionTable) -> Self {
         self.words.correct_by(table.clone());

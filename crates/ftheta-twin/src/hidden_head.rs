@@ -93,7 +93,8 @@ pub fn hidden_head(optics: &Optics, seed: u64) -> Head {
             response(zero_y, gain_y, square_y, cube_y, fifth_y, ripple_y),
         ],
         lens,
-        plane: Plane { height_mm, slope },
+        // Over the work plane at hand, wherever the nominal one is.
+        plane: Plane { height_mm: height_mm - optics.plane_mm, slope },
         frame: Frame { shift_mm, rotation_rad },
     }
 }
@@ -135,6 +136,7 @@ mod tests {
                 field_mm: 336.0,
                 aperture_mm: None,
                 focus: None,
+                plane_mm: 0.0,
             },
             7,
         );

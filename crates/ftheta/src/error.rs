@@ -71,6 +71,16 @@ pub enum Error {
         presets: String,
     },
     /// A table without the machine that it is for.
+    #[error(
+        "a work plane at a height of {z_mm} mm leaves no room below the head, the limit is below {limit_mm} mm"
+    )]
+    NoRoom {
+        /// Height above the nominal work plane, mm.
+        z_mm: f64,
+        /// Where the head is, mm.
+        limit_mm: f64,
+    },
+    /// A table without the machine that it is for.
     #[error("{path}: a correction table is for one machine, name it with --machine", path = path.display())]
     NeedsMachine {
         /// The table.
@@ -275,6 +285,9 @@ impl Error {
             }
             Self::NoMachine { name, presets } => {
                 ("--machine".into(), name.clone(), presets.clone())
+            }
+            Self::NoRoom { z_mm, limit_mm } => {
+                ("--z-mm".into(), format!("{z_mm} mm"), format!("below {limit_mm} mm"))
             }
             Self::NeedsMachine { path } => {
                 (path.display().to_string(), "no --machine".into(), "a preset or a file".into())

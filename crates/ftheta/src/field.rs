@@ -2,7 +2,7 @@
 
 use crate::{Error, import};
 use ftheta_formats::points::{AnglesRow, Place, read_angles, read_places};
-use ftheta_model::machine::{Axis, Lens, Machine, Optics};
+use ftheta_model::machine::{Axis, Lens, Machine};
 use ftheta_model::space::{FieldPoint, MirrorAngles};
 use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::focus::travel_of_shift_mm;
@@ -131,9 +131,9 @@ pub fn angles_of(
     let has_focus = matches!(machine.optics.lens, Lens::PostObjective { .. });
     let mapped = |place: &Place| {
         let Place { place_mm, z_mm, .. } = *place;
-        let height_mm = z_mm.unwrap_or(0.0);
+        let height_mm = z_mm.unwrap_or(machine.optics.plane_mm);
         let unreached = Unmapped::Place { place_mm, z_mm: height_mm };
-        let optics = raised(&machine.optics, height_mm).ok_or(unreached)?;
+        let optics = machine.optics.at_height(height_mm).ok_or(unreached)?;
         let nominal = angles_from_field(&optics, place_mm).ok_or(unreached)?;
         check_angles(machine, place_mm, nominal)?;
         let angles = match table {
@@ -144,8 +144,7 @@ pub fn angles_of(
         let shift_mm = path_difference_mm(&optics, place_mm) - height_mm;
         let focus_mm = match &machine.optics.focus {
             Some(focus) => {
-                // From the nominal optics: the middle of the travel does not move with the plane.
-                let travel_mm = travel_of_shift_mm(&machine.optics, focus, shift_mm);
+                let travel_mm = travel_of_shift_mm(&optics, focus, shift_mm);
                 let limit_mm = focus.travel_mm;
                 if travel_mm.abs() > limit_mm {
                     let z_mm = height_mm;
@@ -238,18 +237,6 @@ pub fn map_file(
 
 fn at(line: u32, what: Unmapped) -> FieldError {
     FieldError { line, what }
-}
-
-/// The optics with the work plane raised towards the head; `None` where there is no room.
-pub(crate) fn raised(optics: &Optics, z_mm: f64) -> Option<Optics> {
-    let mut optics = optics.clone();
-    if let Lens::PostObjective { working_distance_mm, .. } = &mut optics.lens {
-        *working_distance_mm -= z_mm;
-        if *working_distance_mm <= 0.0 {
-            return None;
-        }
-    }
-    Some(optics)
 }
 
 fn check_angles(

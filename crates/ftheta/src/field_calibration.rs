@@ -2,7 +2,7 @@
 //! the table, and what to do next.
 
 use crate::Error;
-use crate::field::{corrected, raised};
+use crate::field::corrected;
 use crate::field_picture::FieldPicture;
 use ftheta_calibrate::accuracy::{Spread, distance_mm};
 use ftheta_calibrate::calibrate::{CalibrateOptions, Calibration, Model, calibrate};
@@ -115,7 +115,7 @@ pub fn calibrate_plane(
     if onto.drift() != Drift::NONE {
         return Err(CalibrateError::Drifted.into());
     }
-    let optics = raised(&machine.optics, z_mm).ok_or(CalibrateError::Room { z_mm })?;
+    let optics = machine.optics.at_height(z_mm).ok_or(CalibrateError::Room { z_mm })?;
     let there = Machine { optics, ..machine.clone() };
     let rounds: BTreeSet<u32> = points.iter().map(|point| point.round).collect();
     let mut marks = Vec::with_capacity(points.len());

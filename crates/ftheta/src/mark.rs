@@ -179,6 +179,7 @@ pub fn mark(
     let (plan, promise) = planning.plan(toolpath, &mut warnings, observer)?;
     let Played { score, dose, states } = play(&plan, options, observer)?;
     warnings.extend(shortcomings(&plan, &score));
+    warnings.extend(plane_warnings(&plan, options.table.as_ref()));
     let times = plan_times(&plan);
     warnings.extend(promise.and_then(|promise| broken(&plan, &promise)));
     let seed = options.seed;
@@ -240,6 +241,33 @@ fn shortcomings(plan: &PlanDraft, score: &Score) -> Vec<Warning> {
     let dark = |index: usize| plan.marks.iter().any(|m| m.pen_index == index && m.power_w == 0.0);
     for (_, pen) in plan.pens.iter().enumerate().filter(|&(index, _)| dark(index)) {
         warn(format!("pen \"{}\" has no power, so its marks see no light", pen.name));
+    }
+    warnings
+}
+
+/// What a work plane at another height than the nominal one does to spot and places.
+fn plane_warnings(plan: &PlanDraft, table: Option<&CorrectionTable>) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let optics = &plan.machine.optics;
+    let mut warn = |message: String| warnings.push(Warning::new("plane", message));
+    let growth = spot_growth(&plan.machine, optics.plane_mm);
+    if optics.focus.is_none() && growth > SPOT_GROWTH_WARNING {
+        let percent = growth * 100.0;
+        warn(format!("at {} mm the fixed focus has a spot {percent:.0} % larger", optics.plane_mm));
+    }
+    let heights = table.and_then(|table| {
+        let planes = table.planes();
+        Some((planes.first()?.z_mm, planes.last()?.z_mm))
+    });
+    if let Some((low, high)) =
+        heights.filter(|(low, high)| !(*low..=*high).contains(&optics.plane_mm))
+    {
+        let known =
+            if low == high { format!("at {low} mm") } else { format!("{low} to {high} mm") };
+        let height = optics.plane_mm;
+        warn(format!(
+            "the correction table knows planes {known} alone, not the one at {height} mm"
+        ));
     }
     warnings
 }

@@ -116,6 +116,10 @@ fn settings_rows(marked: &Marked, about: &About<'_>) -> Vec<(String, String)> {
     if about.options.head.is_some() {
         rows.push(("Head of the twin", "with mounting errors".into()));
     }
+    if machine.optics.plane_mm != 0.0 {
+        let text = format!("{} mm above the nominal one", machine.optics.plane_mm);
+        rows.push(("Work plane", text));
+    }
     if let Some(focus) = marked.score.focus_error_um {
         let growth = 100.0 * spot_growth(machine, 1e-3 * focus.max);
         let text = format!("off by {:.3} mm at most, spot +{growth:.1} %", 1e-3 * focus.max);

@@ -45,12 +45,13 @@ pub fn read(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
     Ok(table)
 }
 
-/// Reads a correction table of this machine through which marks stay within the mirrors' limits.
+/// Reads a correction table of this machine through which marks in its work plane stay within the
+/// mirrors' limits.
 ///
 /// # Errors
 /// As [`read`], or if an angle or speed could leave its limit.
 pub fn usable(path: &Path, machine: &Machine) -> Result<CorrectionTable, Error> {
-    let table = read(path, machine)?;
+    let table = read(path, machine)?.at_height(machine.optics.plane_mm);
     let checked = table.check_limits(&machine.scanner, &machine.optics);
     checked.map_err(|error| unusable(path, error))?;
     Ok(table)

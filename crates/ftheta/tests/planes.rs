@@ -7,8 +7,12 @@ mod hidden;
 use ftheta::exchange::{ExchangeError, offsets};
 use ftheta::field_calibration::{FieldOptions, calibrate_field, calibrate_plane};
 use ftheta::formats::machine;
+use ftheta::formats::svg::{self, SvgOptions};
+use ftheta::machines::at_height;
+use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::calibration::MeasuredPoint;
-use ftheta::model::machine::{Lens, Machine, Optics};
+use ftheta::model::machine::Machine;
+use ftheta::model::recipe::Recipe;
 use ftheta::model::space::MirrorAngles;
 use ftheta::physics::correction::{CorrectionTable, Drift};
 use ftheta::physics::head::{Head, Tracer};
@@ -26,14 +30,6 @@ fn above(head: &Head, z_mm: f64) -> Head {
     head
 }
 
-fn optics_at(machine: &Machine, z_mm: f64) -> Optics {
-    let mut optics = machine.optics.clone();
-    if let Lens::PostObjective { working_distance_mm, .. } = &mut optics.lens {
-        *working_distance_mm -= z_mm;
-    }
-    optics
-}
-
 /// Marks made as if the plane were the nominal one, measured where they are.
 fn points(machine: &Machine, head: &Head, z_mm: f64, seed: u64) -> Vec<MeasuredPoint> {
     let setup = Setup { field_mm: FIELD_MM, ..Setup::new(9, 10.0, true) };
@@ -45,7 +41,7 @@ fn points(machine: &Machine, head: &Head, z_mm: f64, seed: u64) -> Vec<MeasuredP
 /// Greatest error over the field at a height, µm.
 fn error_um(machine: &Machine, head: &Head, table: &CorrectionTable, z_mm: f64) -> f64 {
     let tracer = Tracer::new(&above(head, z_mm));
-    let optics = optics_at(machine, z_mm);
+    let optics = machine.optics.at_height(z_mm).unwrap();
     let off = grid(21, 0.5 * FIELD_MM).into_iter().map(|target| {
         let nominal = angles_from_field(&optics, target).unwrap();
         let [x_rad, y_rad] = table.angles_at([nominal.x_rad, nominal.y_rad], z_mm);
@@ -92,6 +88,37 @@ fn planes_make_the_field_true_at_all_heights_between() {
     // The nominal plane is what it was, to the last bit.
     let angles = [0.1, -0.05];
     assert_eq!(flat.angles(angles), all.angles(angles));
+}
+
+/// A job over a raised plane: angles, lens and table are those of the height.
+#[test]
+fn marks_are_true_at_a_height() {
+    let Calibrated { mut machine, head, flat, all } = calibrated(901);
+    let height_mm = 17.0;
+    machine.optics.focus.as_mut().unwrap().travel_mm = 12.0;
+    let machine = at_height(machine, height_mm).unwrap();
+    let drawing = r#"<svg xmlns="http://www.w3.org/2000/svg" width="240mm" height="240mm"
+        viewBox="-120 -120 240 240" fill="none" stroke="black">
+        <path d="M110 110 v6 h-6"/><path d="M-112 100 h5"/><path d="M5 -114 l3 3"/></svg>"#;
+    let recipe = Recipe::default();
+    let job = svg::read(drawing.as_bytes(), &recipe, &SvgOptions::default()).unwrap().value;
+    let marked = |table: &CorrectionTable| {
+        let options = MarkOptions {
+            table: Some(table.clone()),
+            head: Some(above(&head, height_mm)),
+            ..MarkOptions::default()
+        };
+        mark(&job, &machine, &recipe, &options, &mut |_| {}).unwrap()
+    };
+    let (one, several) = (marked(&flat), marked(&all));
+    let error_um = |marked: &Marked| marked.score.contour_error_um.max;
+    assert!(error_um(&several) < 40.0, "{} µm", error_um(&several));
+    assert!(error_um(&one) > 1.5 * error_um(&several), "{} µm by one plane", error_um(&one));
+    let told = |marked: &Marked| marked.warnings.iter().any(|w| w.to_string().contains("planes"));
+    assert!(told(&one) && !told(&several));
+    // The same plan on a lens that is where it should be.
+    assert!(several.score.focus_error_um.unwrap().max < 200.0);
+    assert!(at_height(machine, 460.0).unwrap_err().to_string().contains("no room"));
 }
 
 #[test]

@@ -132,7 +132,7 @@ impl Parameters {
             }
             Lens::PostObjective { mirror_distance_mm, working_distance_mm } => {
                 all.extend(DISTANCES);
-                Head::perfect(*mirror_distance_mm, *working_distance_mm, None)
+                Head::perfect(*mirror_distance_mm, working_distance_mm - optics.plane_mm, None)
             }
         };
         Self { nominal, all }

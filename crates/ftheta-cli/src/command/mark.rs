@@ -9,10 +9,12 @@ use ftheta::atlas_store::AtlasStore;
 use ftheta::focus_report::spot_growth;
 use ftheta::formats::svg::SvgOptions;
 use ftheta::mark::{MarkOptions, Marked, mark};
+use ftheta::model::machine::Scanner;
 use ftheta::model::warning::Warning;
 use ftheta::output::Output;
 use ftheta::physics::audit::Limits;
 use ftheta::planner::optimal::{Corner, near_scanner};
+use ftheta::promise::Promise;
 use ftheta::results::{self, About, delay_rows};
 use ftheta::twin::hidden_head::hidden_head;
 use ftheta::{Error, import, machines, tables};
@@ -21,7 +23,10 @@ use std::path::PathBuf;
 /// Plans, plays, reports.
 pub fn run(arguments: &Mark, as_json: bool) -> Result<(), Error> {
     let mut progress = Progress::new("import");
-    let machine = machines::find(&arguments.machine)?;
+    let mut machine = machines::find(&arguments.machine)?;
+    if let Some(z_mm) = arguments.z_mm {
+        machine = machines::at_height(machine, z_mm)?;
+    }
     let (recipe, recipe_path) = import::recipe_for(&arguments.input, arguments.recipe.as_deref())?;
     if let Some(path) = &recipe_path {
         note!("recipe   {}", path.display());
@@ -149,20 +154,7 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
     );
     print_limits(marked.plan.limits());
     if let Some(promise) = &marked.promise {
-        let scanner = &marked.plan.machine.scanner;
-        let near = near_scanner(scanner).kt_uncertainty;
-        let wide = match near > scanner.kt_uncertainty {
-            true => format!(", {:.1} µm with ±{} %", promise.kt_near_mm * 1e3, near * 100.0),
-            false => String::new(),
-        };
-        say!(
-            "promise  contour error {:.1} µm as planned, {:.1} µm with f1 ±{} %, {:.1} µm with Kt ±{} %{wide}",
-            promise.planned_mm * 1e3,
-            promise.f1_mm * 1e3,
-            scanner.f1_uncertainty * 100.0,
-            promise.kt_mm * 1e3,
-            scanner.kt_uncertainty * 100.0
-        );
+        print_promise(promise, &marked.plan.machine.scanner);
     }
     say!(
         "twin     contour error {:.1} µm max, {:.1} µm p99; ends {:.1} µm max; coverage {:.1} µm max",
@@ -203,6 +195,23 @@ fn print(marked: &Marked, warnings: &[Warning], stages: &[(&str, f64)], files: &
     let stages: Vec<String> =
         stages.iter().map(|(name, time_s)| format!("{name} {time_s:.2} s")).collect();
     say!("took     {}", stages.join(", "));
+}
+
+/// One line of what a plan promises.
+fn print_promise(promise: &Promise, scanner: &Scanner) {
+    let near = near_scanner(scanner).kt_uncertainty;
+    let wide = match near > scanner.kt_uncertainty {
+        true => format!(", {:.1} µm with ±{} %", promise.kt_near_mm * 1e3, near * 100.0),
+        false => String::new(),
+    };
+    say!(
+        "promise  contour error {:.1} µm as planned, {:.1} µm with f1 ±{} %, {:.1} µm with Kt ±{} %{wide}",
+        promise.planned_mm * 1e3,
+        promise.f1_mm * 1e3,
+        scanner.f1_uncertainty * 100.0,
+        promise.kt_mm * 1e3,
+        scanner.kt_uncertainty * 100.0
+    );
 }
 
 /// One line of peaks.

@@ -95,6 +95,9 @@ fn optics(machine: &Machine, out: &mut String) {
     if let Some(aperture_mm) = machine.optics.aperture_mm {
         scaled(out, "aperture_mm", aperture_mm, 1.0);
     }
+    if machine.optics.plane_mm != 0.0 {
+        scaled(out, "plane_mm", machine.optics.plane_mm, 1.0);
+    }
     if let Some(focus) = &machine.optics.focus {
         out.push_str("\n[optics.focus]\n");
         scaled(out, "magnification", focus.magnification, 1.0);

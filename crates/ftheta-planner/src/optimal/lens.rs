@@ -4,8 +4,10 @@ use super::fly_by::States;
 use super::path::Path;
 use super::relief::Strain;
 use super::smoothing::{Smoothing, shares};
+use crate::PlanError;
 use ftheta_model::machine::{Focus, Lens, Machine, Optics};
 use ftheta_model::space::MirrorAngles;
+use ftheta_model::toolpath::Mark;
 use ftheta_physics::focus::{lens_gradient, lens_travel_mm};
 use ftheta_physics::follow::TAPS_BEFORE;
 use ftheta_physics::galvo::{Galvo, State};
@@ -79,6 +81,30 @@ impl<'a> LensAxis<'a> {
         lens_travel_mm(self.optics, place.into()).unwrap_or(0.0)
     }
 
+    /// Checks that the lens can put the focus on the places of all marks and on the centre, where
+    /// the mirrors wait.
+    ///
+    /// * `slack_mm`: by which the beam may be off a place
+    ///
+    /// # Errors
+    /// The first place that it cannot.
+    pub(super) fn check(&self, marks: &[Mark], slack_mm: f64) -> Result<(), PlanError> {
+        let most_mm = self.focus.travel_mm + slack_mm / self.focus.magnification.abs();
+        let check = |place: &dyn Fn() -> String, at: Point| {
+            let travel_mm = self.travel_mm(at);
+            if travel_mm.abs() <= most_mm {
+                return Ok(());
+            }
+            let (x_mm, y_mm, limit_mm) = (at.x, at.y, self.focus.travel_mm);
+            Err(PlanError::Focus { place: place(), x_mm, y_mm, travel_mm, limit_mm })
+        };
+        check(&|| "field centre".into(), Point::ZERO)?;
+        marks.iter().enumerate().try_for_each(|(index, mark)| {
+            let place = || format!("mark {index} ({})", mark.source);
+            mark.points.iter().try_for_each(|&at| check(&place, at))
+        })
+    }
+
     /// What the lens allows along a path, all of it as slow as its worst vertex.
     pub(super) fn limits(&self, path: &Path, smoothing: &Smoothing) -> LensLimits {
         let (mut along, mut steepest) = (0.0_f64, 0.0_f64);
@@ -92,7 +118,8 @@ impl<'a> LensAxis<'a> {
         // The way bends no faster than along the second mirror's coordinate, in its centre.
         let bend_mm = match self.optics.lens {
             Lens::PostObjective { working_distance_mm, .. } => {
-                working_distance_mm * self.focus.magnification.abs()
+                let distance_mm = working_distance_mm - self.optics.plane_mm;
+                distance_mm * self.focus.magnification.abs()
             }
             Lens::FTheta { .. } => f64::INFINITY,
         };

@@ -1,5 +1,5 @@
-//! Commands of a focusing lens: where there is light the lens keeps the focus on the beam's place, in
-//! the dark it takes the gentlest way to where the next light begins.
+//! Commands of a focusing lens: where there is light the lens keeps the focus on the beam's place,
+//! in the dark it takes the gentlest way to where the next light begins.
 
 use super::Renderer;
 use ftheta_model::block::Block;

@@ -43,7 +43,7 @@ impl<'a> Words<'a> {
 
     /// Corrects all that is sent from here on.
     pub(super) fn correct_by(&mut self, table: CorrectionTable) {
-        self.correction = Some(table);
+        self.correction = Some(table.at_height(self.plan.machine.optics.plane_mm));
     }
 
     /// The word pair for a place.

@@ -34,6 +34,7 @@ pub fn machine() -> Machine {
             field_mm: 120.0,
             aperture_mm: None,
             focus: None,
+            plane_mm: 0.0,
         },
         laser: Laser {
             wavelength_nm: 1064.0,

@@ -55,6 +55,7 @@ impl Setup {
             field_mm: 336.0,
             aperture_mm: None,
             focus: None,
+            plane_mm: 0.0,
         }
     }
 
