@@ -25,6 +25,8 @@ pub struct Setup {
     pub n_side: usize,
     pub field_mm: f64,
     pub noise_um: f64,
+    /// Part of the field over which marks are spread; errors are judged in all of it.
+    pub reach: f64,
     /// Whether the machine file has the lens' polynomial, or its focal length alone.
     pub polynomial: bool,
     /// Times the errors that no model contains.
@@ -39,6 +41,7 @@ impl Setup {
             n_side,
             field_mm: 280.0,
             noise_um,
+            reach: 1.0,
             polynomial,
             stress: 1.0,
             model: None,
@@ -83,7 +86,7 @@ impl Setup {
 
     /// Targets, row by row.
     pub fn targets(&self) -> Vec<FieldPoint> {
-        grid(self.n_side, 0.5 * self.field_mm)
+        grid(self.n_side, 0.5 * self.reach * self.field_mm)
     }
 
     /// Marks through the nominal inverse, measured with noise.
