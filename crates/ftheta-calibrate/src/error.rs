@@ -40,7 +40,7 @@ pub enum CalibrateError {
     },
     /// Numbers of another unit, most likely.
     #[error(
-        "the measured field is {ratio:.4} times as large as the targets: {suspicion}; give both in \
+        "the measured field is {ratio:.4} times as large as the targets ({suspicion}): give both in \
          mm"
     )]
     Unit {
@@ -130,4 +130,52 @@ pub enum CalibrateError {
     /// The table made is not usable.
     #[error("{0}")]
     Table(#[from] ftheta_physics::correction::CorrectionError),
+}
+
+impl CalibrateError {
+    /// Place, value and limit for a machine-readable message.
+    pub fn fault(&self) -> (String, String, String) {
+        let (place, value, limit) = match *self {
+            Self::TooFew { n_marks, model, limit } => {
+                ("points", format!("{n_marks} marks"), format!("{limit} marks for {model}"))
+            }
+            Self::Collinear { across_mm, along_mm } => (
+                "points: targets",
+                format!("{across_mm:.3} mm across, {along_mm:.1} mm along"),
+                "a fiftieth".into(),
+            ),
+            Self::Narrow { spread_rad, limit_rad } => {
+                ("points", format!("{spread_rad:.4} rad"), format!("{limit_rad} rad"))
+            }
+            Self::Unit { ratio, .. } | Self::Size { ratio, .. } => {
+                ("points: measured by targets", format!("{ratio:.4}"), "0.5 to 2".into())
+            }
+            Self::Exchanged { n_targets, n_measured, .. } => (
+                "points: columns",
+                format!("{n_targets} different x of targets"),
+                format!("{n_measured}, as of the measured"),
+            ),
+            Self::Unrelated { rms_mm, field_mm } => (
+                "points",
+                format!("{rms_mm:.1} mm rms left"),
+                format!("a small part of {field_mm:.0} mm"),
+            ),
+            Self::Singular { model, n_marks } => {
+                ("points", format!("{n_marks} marks"), format!("what {model} can be fitted to"))
+            }
+            Self::Target { line, x_mm, y_mm } => {
+                let place = format!("line {line}");
+                return (place, format!("({x_mm}, {y_mm}) mm"), "the machine's reach".into());
+            }
+            Self::Unreachable { x_mm, y_mm } => (
+                "table",
+                format!("({x_mm:.1}, {y_mm:.1}) mm"),
+                "the calibrated head's reach".into(),
+            ),
+            Self::Room { z_mm } => ("--z-mm", format!("{z_mm} mm"), "below the head".into()),
+            Self::Drifted => ("--onto", "a table with a drift".into(), "none".into()),
+            Self::Table(ref error) => return error.fault(),
+        };
+        (place.to_owned(), value, limit)
+    }
 }

@@ -60,7 +60,7 @@ impl CorrectionFileError {
                 "another checksum".into(),
                 "that of the lines above it".into(),
             ),
-            Self::Table(error) => ("table".into(), error.to_string(), String::new()),
+            Self::Table(error) => error.fault(),
         }
     }
 }

@@ -147,6 +147,41 @@ pub enum CorrectionError {
     },
 }
 
+impl CorrectionError {
+    /// Place, value and limit for a machine-readable message.
+    pub fn fault(&self) -> (String, String, String) {
+        let degrees = |rad: f64| format!("{:.3}°", rad.to_degrees());
+        let node = |[column, row]: [usize; 2]| format!("table: column {column}, row {row}");
+        let at = |place_rad: [f64; 2], axis| {
+            let [x, y] = place_rad.map(degrees);
+            format!("table: {axis:?} at nominal angles ({x}, {y})")
+        };
+        match *self {
+            Self::Empty => ("table".into(), "0 planes".into(), "1 plane".into()),
+            Self::Planes { index, z_mm } => (
+                format!("table: plane {index}"),
+                format!("{z_mm} mm"),
+                "above the one before".into(),
+            ),
+            Self::Value { node: at, value_rad, limit_rad } => {
+                (node(at), format!("{value_rad} rad"), format!("±{limit_rad} rad"))
+            }
+            Self::Fold { node: at } => (node(at), "folds over".into(), "one to one".into()),
+            Self::Machine { ref table, ref table_id, ref machine, ref id } => (
+                "table: machine".into(),
+                format!("{table} (optics {table_id})"),
+                format!("{machine} (optics {id})"),
+            ),
+            Self::Angle { place_rad, axis, value_rad, limit_rad } => {
+                (at(place_rad, axis), degrees(value_rad), degrees(limit_rad))
+            }
+            Self::Speed { place_rad, axis, ratio, limit } => {
+                (at(place_rad, axis), format!("{ratio:.4} times"), format!("{limit:.4} times"))
+            }
+        }
+    }
+}
+
 impl About {
     /// A table for a machine.
     ///

@@ -9,6 +9,29 @@ mod hidden;
 use ftheta::calibrate::calibrate::Model;
 use hidden::Setup;
 
+/// Marks a side, noise, whether the lens' polynomial is known, what is asked.
+const PHYSICAL: [(usize, f64, bool, &str); 11] = [
+    (3, 10.0, true, "18 / 34"),
+    (5, 10.0, false, "9 / 21"),
+    (9, 10.0, false, "6 / 17"),
+    (17, 10.0, false, "4 / 13"),
+    (3, 2.0, true, "14 / 26"),
+    (5, 2.0, false, "4 / 9"),
+    (9, 2.0, false, "2.2 / 7"),
+    (17, 2.0, false, "1.4 / 5"),
+    (3, 50.0, true, "44 / 95"),
+    (3, 10.0, false, "34 / 54"),
+    (5, 50.0, false, "36 / 80"),
+];
+
+/// Surfaces, as in the tables of `optics.md` B.2, whose marks reach 5 % beyond the field.
+const OVER_THE_EDGE: [(Model, usize, &str); 4] = [
+    (Model::Polynomial, 9, "6.9 / 17, within 15 %"),
+    (Model::Polynomial, 17, "4.4 / 12, within 15 %"),
+    (Model::Zones, 9, "10.5 / 26, within 15 %"),
+    (Model::Zones, 17, "5.4 / 15, within 15 %"),
+];
+
 fn main() {
     let n_heads: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(20);
     let row = |name: &str, setup: Setup, asked: &str| {
@@ -29,24 +52,10 @@ fn main() {
         );
     };
     println!("mean over {n_heads} heads, 280 mm, rms / mean of maxima, µm");
-    {
-        for (n, noise, polynomial, asked) in [
-            (3, 10.0, true, "18 / 34"),
-            (5, 10.0, false, "9 / 21"),
-            (9, 10.0, false, "6 / 17"),
-            (17, 10.0, false, "4 / 13"),
-            (3, 2.0, true, "14 / 26"),
-            (5, 2.0, false, "4 / 9"),
-            (9, 2.0, false, "2.2 / 7"),
-            (17, 2.0, false, "1.4 / 5"),
-            (3, 50.0, true, "44 / 95"),
-            (3, 10.0, false, "34 / 54"),
-            (5, 50.0, false, "36 / 80"),
-        ] {
-            let setup = Setup::new(n, noise, polynomial);
-            let lens = if polynomial { "polynomial" } else { "focal length" };
-            row(&format!("{} marks, {noise} µm, {lens}", n * n), setup, asked);
-        }
+    for (n, noise, polynomial, asked) in PHYSICAL {
+        let setup = Setup::new(n, noise, polynomial);
+        let lens = if polynomial { "polynomial" } else { "focal length" };
+        row(&format!("{} marks, {noise} µm, {lens}", n * n), setup, asked);
     }
     row(
         "25 marks, 10 µm, 120 mm",
@@ -61,22 +70,10 @@ fn main() {
             row(&format!("{field_mm} mm, 9 marks, 50 µm, {}", model.name()), setup, asked);
         }
     }
-    // The tables of optics.md B.2 for surfaces come from marks that reach 5 % beyond the field.
-    for model in [Model::Polynomial, Model::Zones] {
-        for n in [9, 17] {
-            let setup = Setup { model: Some(model), reach: 1.05, ..Setup::new(n, 10.0, false) };
-            let asked = match (model, n) {
-                (Model::Zones, 9) => "10.5 / 26, within 15 %",
-                (Model::Zones, _) => "5.4 / 15, within 15 %",
-                (_, 9) => "6.9 / 17, within 15 %",
-                _ => "4.4 / 12, within 15 %",
-            };
-            row(
-                &format!("{}, {} marks over 105 % of the field", model.name(), n * n),
-                setup,
-                asked,
-            );
-        }
+    for (model, n, asked) in OVER_THE_EDGE {
+        let setup = Setup { model: Some(model), reach: 1.05, ..Setup::new(n, 10.0, false) };
+        let name = format!("{}, {} marks over 105 % of the field", model.name(), n * n);
+        row(&name, setup, asked);
     }
     for model in Model::ALL {
         for n in [3, 5, 9, 17] {

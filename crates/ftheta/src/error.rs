@@ -171,6 +171,14 @@ pub enum Error {
     /// Measured marks give no calibration.
     #[error(transparent)]
     Calibrate(#[from] CalibrateError),
+    /// The same of marks from a file.
+    #[error("{path}: {source}", path = path.display())]
+    Points {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: CalibrateError,
+    },
     /// Commands of a controller in a table of points.
     #[error("{path}: it holds commands of a controller, say how many of its units are a millimetre with --units-per-mm", path = path.display())]
     Units {
@@ -271,6 +279,15 @@ pub struct Fault {
 }
 
 impl Error {
+    /// The same with the file that the marks come from.
+    #[must_use]
+    pub fn of_points(self, path: Option<&Path>) -> Self {
+        match (self, path) {
+            (Self::Calibrate(source), Some(path)) => Self::Points { path: path.into(), source },
+            (other, _) => other,
+        }
+    }
+
     /// The error in parts.
     pub fn fault(&self) -> Fault {
         let (place, value, limit) = match self {
@@ -309,7 +326,8 @@ impl Error {
             Self::CameraFile { path, source } => in_file(path, source.fault()),
             Self::CameraCalibration(error) => error.fault(),
             Self::Picture { path, source } => in_file(path, source.fault()),
-            Self::Calibrate(error) => ("points".into(), error.to_string(), String::new()),
+            Self::Calibrate(error) => error.fault(),
+            Self::Points { path, source } => in_file(path, source.fault()),
             Self::Units { path } => {
                 (path.display().to_string(), "no --units-per-mm".into(), "above 0".into())
             }

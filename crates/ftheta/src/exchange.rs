@@ -57,14 +57,24 @@ pub enum ExchangeError {
 impl ExchangeError {
     /// Place, value and limit for a machine-readable message.
     pub fn fault(&self) -> (String, String, String) {
-        let place = match self {
-            Self::Node { row, column, .. } => format!("row {row}, column {column}"),
-            Self::Grid { .. } => "grid".into(),
-            Self::Planes { .. } => "planes".into(),
-            Self::Optics => "optics".into(),
-            Self::Table(_) => "table".into(),
-        };
-        (place, self.to_string(), String::new())
+        match self {
+            Self::Node { row, column, what } => {
+                let (value, limit) = what.fault();
+                (format!("row {row}, column {column}"), value, limit)
+            }
+            Self::Grid { n_nodes, half_width_mm } => (
+                "grid".into(),
+                format!("{n_nodes} nodes over ±{half_width_mm} mm"),
+                "2 nodes a side over more than 0 mm".into(),
+            ),
+            Self::Planes { n_planes } => {
+                ("table".into(), format!("{n_planes} planes"), "1 plane".into())
+            }
+            Self::Optics => {
+                ("optics".into(), "the mirrors' greatest angles".into(), "what they reach".into())
+            }
+            Self::Table(error) => error.fault(),
+        }
     }
 }
 

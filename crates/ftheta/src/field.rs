@@ -95,21 +95,28 @@ pub enum Unmapped {
 impl FieldError {
     /// Place, value and limit for a machine-readable message.
     pub fn fault(&self) -> (String, String, String) {
+        let (value, limit) = self.what.fault();
+        (format!("line {}", self.line), value, limit)
+    }
+}
+
+impl Unmapped {
+    /// Value and limit for a machine-readable message.
+    pub fn fault(&self) -> (String, String) {
         let place = |p: FieldPoint| format!("({}, {}) mm", p.x_mm, p.y_mm);
         let degrees = |rad: f64| format!("{:.4}°", rad.to_degrees());
-        let (value, limit) = match self.what {
-            Unmapped::Place { place_mm, .. } => (place(place_mm), "the reach of the optics".into()),
-            Unmapped::Angle { angle_rad, limit_rad, .. } => {
+        match *self {
+            Self::Place { place_mm, .. } => (place(place_mm), "the reach of the optics".into()),
+            Self::Angle { angle_rad, limit_rad, .. } => {
                 (degrees(angle_rad), format!("±{}", degrees(limit_rad)))
             }
-            Unmapped::Focus { travel_mm, limit_mm, .. } => {
+            Self::Focus { travel_mm, limit_mm, .. } => {
                 (format!("{travel_mm:.4} mm"), format!("±{limit_mm} mm"))
             }
-            Unmapped::Angles { angles, limit } => {
+            Self::Angles { angles, limit } => {
                 (format!("({}, {})", degrees(angles.x_rad), degrees(angles.y_rad)), limit.into())
             }
-        };
-        (format!("line {}", self.line), value, limit)
+        }
     }
 }
 

@@ -63,10 +63,13 @@ fn run_field(arguments: &CalibrateField, as_json: bool) -> Result<(), Error> {
     let field = match (arguments.z_mm, &arguments.onto) {
         (Some(z_mm), Some(path)) => {
             let onto = tables::read(path, &machine)?;
-            calibrate_plane(&machine, &points, &options, (z_mm, &onto))?
+            calibrate_plane(&machine, &points, &options, (z_mm, &onto))
         }
-        _ => calibrate_field(&machine, &points, &options)?,
+        _ => calibrate_field(&machine, &points, &options),
     };
+    let image = arguments.picture.image.first().map(AsRef::as_ref);
+    let source = arguments.points.as_deref().or(image);
+    let field = field.map_err(|error| error.of_points(source))?;
     warnings.extend(field.calibration.warnings.iter().cloned());
     tables::write(&field.table, &machine, &arguments.out, CorVersion::Two)?;
     let report = arguments.out.with_file_name("calibration.html");
@@ -216,7 +219,8 @@ fn run_drift(arguments: &CalibrateDrift, as_json: bool) -> Result<(), Error> {
     let machine = machines::find(&arguments.machine)?;
     let table = tables::read(&arguments.table, &machine)?;
     let Imported { value: points, warnings } = import::measured_points(&arguments.points, None)?;
-    let (table, found) = calibrate_drift(&machine, table, &points)?;
+    let (table, found) = calibrate_drift(&machine, table, &points)
+        .map_err(|error| error.of_points(Some(&arguments.points)))?;
     tables::write(&table, &machine, &arguments.out, CorVersion::Two)?;
     let drift = table.drift();
     let out = arguments.out.display().to_string();
