@@ -6,8 +6,11 @@ use ftheta::formats::{machine, svg};
 use ftheta::mark::{MarkOptions, Marked, mark};
 use ftheta::model::block::{Block, LaserEdge, SampleSink};
 use ftheta::model::machine::Machine;
+use ftheta::model::plan::PlanDraft;
 use ftheta::model::recipe::Recipe;
 use ftheta::model::space::DacCodes;
+use ftheta::physics::audit::AuditError;
+use ftheta::physics::plan::Plan;
 use ftheta::planner::optimal::Corner;
 use ftheta::planner::render::Renderer;
 use ftheta::report::score::RatioSpread;
@@ -106,6 +109,19 @@ fn triggers_are_never_closer_than_the_rate_allows() {
         assert!(closest >= 12_498, "{closest} ns");
         assert!(spacing(&marked).max < 1.15, "{:?}", spacing(&marked));
     }
+}
+
+/// More power than the pen's would be pulses faster than the source gives them.
+#[test]
+fn the_audit_keeps_the_rate_of_triggers() {
+    let marked = run(&pulsed(80.0, true), "M2 2 L6 2", Corner::Auto);
+    let mut draft = PlanDraft::clone(&marked.plan);
+    draft.marks[0].power_w *= 1.01;
+    let error = Plan::new(draft.clone()).unwrap_err();
+    assert!(matches!(error, AuditError::Power { .. }), "{error}");
+    // A source that runs free gives that power at its own rate.
+    draft.machine.laser.pulses_triggered = false;
+    Plan::new(draft).unwrap();
 }
 
 /// Every mark gets its light, also one that is shorter than half a pulse.

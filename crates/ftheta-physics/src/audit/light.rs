@@ -1,6 +1,6 @@
 //! Checks that light falls only while its mark is being made.
 
-use super::AuditError;
+use super::{AuditError, ROUNDING};
 use ftheta_model::plan::{Motion, PlanDraft, PlannedMark};
 
 /// When the mirrors make a mark, ns.
@@ -27,7 +27,12 @@ pub fn check_light(draft: &PlanDraft, lag_s: f64, by_voltage: bool) -> Result<()
     let mut last_off_ns = 0;
     for (index, (mark, window)) in draft.marks.iter().zip(windows).enumerate() {
         let place = || format!("mark {index} ({})", mark.source);
-        check_power(mark, laser.power_max_w, &place)?;
+        // Triggers come at the source's rate at the pen's power, and must not come faster.
+        let limit_w = match (laser.pulses_triggered, draft.pens.get(mark.pen_index)) {
+            (true, Some(pen)) => laser.power_max_w.min(pen.power_w * (1.0 + ROUNDING)),
+            _ => laser.power_max_w,
+        };
+        check_power(mark, limit_w, &place)?;
         let ordered = last_off_ns <= mark.on_ns && mark.on_ns <= mark.off_ns;
         if !ordered || mark.off_ns >= end_ns {
             let what = "its laser edges overlap another mark's, or the plan's end".into();
