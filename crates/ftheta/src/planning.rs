@@ -15,12 +15,22 @@ use ftheta_planner::corner::Corners;
 use ftheta_planner::jump::{Atlas, AxisOptions, CurrentBound, Model, Transitions};
 use ftheta_planner::optimal::{self, Motions, OptimalOptions, OptimalPlanner, Restraint};
 
-/// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within the
-/// machine file's uncertainties: with both mirrors off as far, the tolerance is kept.
-const HELD_SHARE: f64 = 0.75;
+/// How much of the tolerance is used up knowingly.
+#[derive(Clone, Copy)]
+struct Care {
+    /// Part of what a plan may miss its marks by that it does.
+    share: f64,
+    /// Part of the tolerance by which a mirror may be off when a mark begins, on any motor within
+    /// the machine file's uncertainties.
+    held: f64,
+}
 
-/// Parts of what a plan may miss its marks by, in the order to be tried.
-const CARES: [f64; 3] = [1.0, 0.75, 0.5];
+/// In the order to be tried: both mirrors off as far at once are rare, but there are jobs for them.
+const CARES: [Care; 3] = [
+    Care { share: 1.0, held: 0.75 },
+    Care { share: 0.75, held: 0.75 },
+    Care { share: 0.5, held: 0.65 },
+];
 
 /// What is left of a jump is not asked to be less than this, which any servo drowns, rad.
 const EPSILON_MIN_RAD: f64 = 2e-8;
@@ -105,16 +115,16 @@ impl Planning<'_> {
         Ok(Plan::new(draft)?)
     }
 
-    fn optimal(&self, restraint: Restraint, voltage_reserve: f64, care: f64) -> OptimalOptions {
+    fn optimal(&self, restraint: Restraint, voltage_reserve: f64, care: Care) -> OptimalOptions {
         let MarkOptions { tolerance_mm, corner, .. } = *self.options;
-        OptimalOptions { tolerance_mm, care, corner, voltage_reserve, restraint }
+        OptimalOptions { tolerance_mm, care: care.share, corner, voltage_reserve, restraint }
     }
 
     /// Plans with ever more restraint, until the audit finds that driver and coils stand it.
     fn plan_optimal(
         &self,
         toolpath: &Toolpath,
-        care: f64,
+        care: Care,
         warnings: &mut Vec<Warning>,
         observer: &mut dyn FnMut(Stage),
     ) -> Result<Plan, Error> {
@@ -123,7 +133,7 @@ impl Planning<'_> {
         for restraint in optimal::RESTRAINTS {
             let mut scanner = machine.scanner.clone();
             scanner.current_max_a *= 1.0 - restraint.current_reserve;
-            let axis = self.axis_options(&restraint);
+            let axis = self.axis_options(&restraint, care);
             let longest_rad = optimal::longest_step_rad(toolpath, machine);
             let atlas = self.atlas(&scanner, axis, longest_rad, warnings, observer)?;
             observer(Stage::Plan);
@@ -161,9 +171,9 @@ impl Planning<'_> {
         self.plan_classic(toolpath.clone(), observer)
     }
 
-    fn axis_options(&self, restraint: &Restraint) -> AxisOptions {
+    fn axis_options(&self, restraint: &Restraint, care: Care) -> AxisOptions {
         let Self { machine, options, .. } = *self;
-        let epsilon_rad = HELD_SHARE * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
+        let epsilon_rad = care.held * options.tolerance_mm / scale_mm_per_rad(&machine.optics);
         AxisOptions {
             model: Model::Held { epsilon_rad: epsilon_rad.clamp(EPSILON_MIN_RAD, EPSILON_MAX_RAD) },
             tick_s: machine.output.period_s(),
