@@ -10,6 +10,7 @@ mod spiral;
 
 use crate::PlanError;
 use crate::jump::{AxisOptions, CurrentBound, JumpError, Model, Passage, fewest_ticks_of_passages};
+use crate::optimal::lens::LensAxis;
 use ftheta_model::machine::{Machine, Scanner};
 use ftheta_model::plan::{Motion, PlanDraft, PlannedMark, Planner, Segment};
 use ftheta_model::recipe::Pen;
@@ -103,8 +104,8 @@ pub fn draft(
     let way_out = [harmonics.states(phase(n_turn)), REST];
     let run_out = passages.between(Model::Flexible, way_out, 1)?.ok_or_else(no_room)?;
     let laser = &machine.laser;
-    let lead_ns = laser.on_latency_ns.max(0) as u64;
-    let n_first = 1 + lead_ns.div_ceil(u64::from(machine.output.period_ns)) as u32;
+    let way_in = [REST, harmonics.states(phase(0))];
+    let [n_first, n_last] = rests(machine, [(&run_in, way_in), (&run_out, way_out)])?;
     let mut builder = Builder { drives: Vec::new(), segments: Vec::new() };
     builder.hold(n_first);
     let n_in = run_in.len();
@@ -112,7 +113,7 @@ pub fn draft(
     builder.drive(Some(0), &turn);
     let n_out = run_out.len();
     builder.drive(None, &run_out);
-    builder.hold(N_TICKS_LAST + 1);
+    builder.hold(n_last);
     // Computed voltages act a tick after their sample.
     let on_s = (f64::from(n_first) + n_in as f64 + 1.0) * period_s;
     let edge_ns =
@@ -144,6 +145,29 @@ pub fn draft(
         run_out_s: n_out as f64 * period_s,
         turn_s,
     })
+}
+
+/// Ticks of rest in the centre before the way to an ellipse and after the way back: for light that
+/// begins late, for the mirrors, and for a focusing lens that takes longer than they do.
+///
+/// * `ways`: there and back, and the states at their ends
+fn rests(machine: &Machine, ways: [(&Voltages, [States; 2]); 2]) -> Result<[u32; 2], PlanError> {
+    let lead_ns = machine.laser.on_latency_ns.max(0) as u64;
+    let lead_ticks = lead_ns.div_ceil(u64::from(machine.output.period_ns)) as u32;
+    let (mut first, mut last) = (lead_ticks, N_TICKS_LAST);
+    if let Some(lens) = LensAxis::new(machine) {
+        let wait = |(way, ends): (&Voltages, [States; 2])| -> Result<u32, PlanError> {
+            let ends = ends.each_ref().map(|states| lens.state(states));
+            // At the edge of light the lens is between two ticks.
+            let n_ticks = lens.n_ticks(ends, 1).ok_or_else(no_room)? + 1;
+            Ok(n_ticks.saturating_sub(way.len()) as u32)
+        };
+        let [there, back] = ways;
+        // Nothing moves before the lag.
+        first = first.max(lens.n_lag_ticks() + wait(there)?);
+        last = last.max(wait(back)?);
+    }
+    Ok([first + 1, last + 1])
 }
 
 /// The shortest way from rest in the centre into the ellipse, and the turns at which it gets there.

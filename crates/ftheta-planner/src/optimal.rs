@@ -8,7 +8,7 @@ mod fly_by;
 mod glide;
 mod heat;
 mod join;
-mod lens;
+pub(crate) mod lens;
 mod marking;
 mod path;
 mod pieces;

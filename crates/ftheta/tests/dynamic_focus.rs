@@ -3,6 +3,7 @@
 
 use ftheta::Error;
 use ftheta::atlas_store::AtlasStore;
+use ftheta::circle::{Ellipse, Round, circle};
 use ftheta::field::angles_of;
 use ftheta::formats::points::Place;
 use ftheta::formats::{machine, svg};
@@ -10,7 +11,7 @@ use ftheta::mark::{MarkOptions, Marked, mark, play};
 use ftheta::model::block::Block;
 use ftheta::model::machine::{Drive, Focus, Machine};
 use ftheta::model::plan::{PlanDraft, Planner};
-use ftheta::model::recipe::Recipe;
+use ftheta::model::recipe::{Pen, Recipe};
 use ftheta::model::space::FieldPoint;
 use ftheta::physics::audit::AuditError;
 use ftheta::physics::focus::lens_travel_mm;
@@ -143,6 +144,23 @@ fn the_focus_is_on_the_lit_beam() {
     fixed.optics.focus = None;
     let fixed = run(&fixed, None).unwrap();
     assert!(fixed.score.focus_error_um.is_none() && lens_mm(&fixed.plan).is_empty());
+}
+
+/// A circle beside the field's centre waits for the lens before and after it.
+#[test]
+fn circles_wait_for_the_lens() {
+    let ellipse = Ellipse::new([100.0, 50.0], [2.0, 2.0], 500.0);
+    let round = Round::Ellipse(ellipse);
+    let of = |machine: &Machine| {
+        circle(machine, &round, Pen::default(), &MarkOptions::default(), &mut |_| {}).unwrap()
+    };
+    let mut fixed = head();
+    fixed.optics.focus = None;
+    let (circled, quick) = (of(&head()), of(&fixed));
+    // 3 mm of lens at 280 mm/s, twice.
+    assert!(circled.marked.plan.n_samples() > quick.marked.plan.n_samples() + 2000);
+    assert!(circled.roundness.error_max_mm < 3e-4, "{:?}", circled.roundness);
+    assert!(circled.marked.score.focus_error_um.unwrap().max < 100.0);
 }
 
 #[test]

@@ -1,9 +1,7 @@
 //! Archimedean spirals at constant speed: a track without averaging, so that nothing of its radius
 //! is lost, between a run-in and a run-out.
 
-use super::{
-    Builder, CircleDraft, CircleOptions, HELD_SHARE, N_TICKS_LAST, Passages, REST, no_room,
-};
+use super::{Builder, CircleDraft, CircleOptions, HELD_SHARE, Passages, REST, no_room, rests};
 use crate::PlanError;
 use crate::jump::Model;
 use crate::render::track::angles_around;
@@ -195,14 +193,13 @@ pub fn spiral(
     let run_in = run_in.ok_or_else(no_room)?;
     let run_out = passages.between(Model::Flexible, [ends, REST], 1)?.ok_or_else(no_room)?;
     let laser = &machine.laser;
-    let lead_ns = laser.on_latency_ns.max(0) as u64;
-    let n_first = 1 + lead_ns.div_ceil(u64::from(machine.output.period_ns)) as u32;
+    let [n_first, n_last] = rests(machine, [(&run_in, [REST, starts]), (&run_out, [ends, REST])])?;
     let mut builder = Builder { drives: Vec::new(), segments: Vec::new() };
     builder.hold(n_first);
     builder.drive(None, &run_in);
     builder.segments.push(Segment { mark_index: Some(0), n_ticks: n_track, motion });
     builder.drive(None, &run_out);
-    builder.hold(N_TICKS_LAST + 1);
+    builder.hold(n_last);
     // Computed voltages act a tick after their sample.
     let n_before = f64::from(n_first) + run_in.len() as f64 + 1.0 + N_AROUND;
     let on_s = n_before * period_s;

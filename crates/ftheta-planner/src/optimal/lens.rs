@@ -24,7 +24,7 @@ const BEND_SHARE: f64 = 0.1;
 const N_TICKS_MAX: usize = 1_000_000;
 
 /// Travel, mm, and speed, mm/s.
-pub(super) type LensState = (f64, f64);
+pub(crate) type LensState = (f64, f64);
 
 /// What the lens allows along a path.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +38,7 @@ pub(super) struct LensLimits {
 }
 
 /// The lens and its axis.
-pub(super) struct LensAxis<'a> {
+pub(crate) struct LensAxis<'a> {
     optics: &'a Optics,
     focus: &'a Focus,
     mirror_row: State,
@@ -48,7 +48,7 @@ pub(super) struct LensAxis<'a> {
 
 impl<'a> LensAxis<'a> {
     /// `None` for a machine without such a lens.
-    pub(super) fn new(machine: &'a Machine) -> Option<Self> {
+    pub(crate) fn new(machine: &'a Machine) -> Option<Self> {
         let galvo = Galvo::new(&machine.scanner);
         Some(Self {
             optics: &machine.optics,
@@ -60,12 +60,12 @@ impl<'a> LensAxis<'a> {
     }
 
     /// Samples by which its commands are ahead.
-    pub(super) fn n_lag_ticks(&self) -> u32 {
+    pub(crate) fn n_lag_ticks(&self) -> u32 {
         (self.focus.lag_s / self.tick_s).ceil() as u32
     }
 
     /// Where the lens has to be for the mirrors' states, and how fast.
-    pub(super) fn state(&self, states: &States) -> LensState {
+    pub(crate) fn state(&self, states: &States) -> LensState {
         let after = |time_s: f64| {
             let [x_rad, y_rad] = [0, 1].map(|axis| {
                 let state = &states[axis];
@@ -172,7 +172,7 @@ impl<'a> LensAxis<'a> {
 
     /// Fewest ticks, but `n_least` or more, in which the lens gets from state to state, whichever
     /// way; `None` if there are too many.
-    pub(super) fn n_ticks(&self, ends: [LensState; 2], n_least: usize) -> Option<usize> {
+    pub(crate) fn n_ticks(&self, ends: [LensState; 2], n_least: usize) -> Option<usize> {
         (n_least.max(1)..=N_TICKS_MAX).find(|&n_ticks| self.reaches(ends, n_ticks))
     }
 
