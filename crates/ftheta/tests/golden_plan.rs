@@ -87,7 +87,13 @@ fn optimal() {
     };
     let near = transitions.less_certain(&near_scanner(&machine.scanner)).unwrap();
     let motions = Motions::Known { transitions: &transitions, near: &near, corners: &corners };
-    let draft = OptimalPlanner::new(&machine, motions, options).unwrap().draft(toolpath).unwrap();
+    let planner = OptimalPlanner::new(&machine, motions, options).unwrap();
+    // On as many processors as there are; then nothing is left to be solved.
+    planner.solve(&toolpath);
+    let n_solved = || transitions.solved().len() + near.solved().len() + corners.solved().len();
+    let n_ahead = n_solved();
+    let draft = planner.draft(toolpath).unwrap();
+    assert_eq!(n_ahead, n_solved());
     expect![[r#"
         mark 0 #corner: light edges 370000 2381904 ns, 9.909823930961833 W
         mark 1 #line: light edges 2690000 3813034 ns, 10 W

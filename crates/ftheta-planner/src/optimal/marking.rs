@@ -76,7 +76,8 @@ impl Stroke<'_> {
 type Powers = Vec<(f64, f64)>;
 
 impl Marking<'_> {
-    /// Makes all marks, from the centre and back to it if so wanted.
+    /// Makes all marks, from the centre and back to it if so wanted; else the first of them is not
+    /// flown to, nor the last one left.
     ///
     /// # Errors
     /// As [`Self::mark`].
@@ -85,13 +86,14 @@ impl Marking<'_> {
         marks: impl IntoIterator<Item = Mark>,
         [from_centre, to_centre]: [bool; 2],
     ) -> Result<(), PlanError> {
-        if from_centre {
-            // Long enough for an on edge that comes early, and for the first commands of a lens.
-            let latency_ns = self.weave.machine.laser.on_latency_ns.max(0) as u64;
-            let period_ns = u64::from(self.weave.machine.output.period_ns);
-            let n_early = latency_ns.div_ceil(period_ns) as u32;
-            let n_lens = self.weave.lens.as_ref().map_or(0, LensAxis::n_lag_ticks);
-            self.weave.rest_in_centre(N_REST_TICKS.max(n_early).max(n_lens));
+        // Long enough for an on edge that comes early, and for the first commands of a lens.
+        let latency_ns = self.weave.machine.laser.on_latency_ns.max(0) as u64;
+        let period_ns = u64::from(self.weave.machine.output.period_ns);
+        let n_early = latency_ns.div_ceil(period_ns) as u32;
+        let n_lens = self.weave.lens.as_ref().map_or(0, LensAxis::n_lag_ticks);
+        self.weave.rest_in_centre(N_REST_TICKS.max(n_early).max(n_lens));
+        if !from_centre {
+            self.weave.forget_place();
         }
         marks.into_iter().try_for_each(|mark| self.mark(mark))?;
         if to_centre && !self.weave.fly_home()? {

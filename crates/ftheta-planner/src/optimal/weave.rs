@@ -101,6 +101,11 @@ impl<'a> Weave<'a> {
         self.states = Some([State::zeros(); 2]);
     }
 
+    /// From here on the axes may be anywhere.
+    pub(super) fn forget_place(&mut self) {
+        self.states = None;
+    }
+
     /// Time of the mirrors at the end of what is planned, s: computed voltages act a tick after
     /// their sample, angles that are sent are reached after the lag.
     pub(super) fn now_s(&self) -> f64 {
