@@ -137,14 +137,9 @@ fn optics(section: &Section<'_>) -> Result<Optics, TomlError> {
         Lens::FTheta { coefficients_mm }
     };
     let axes = [("x", Axis::X), ("y", Axis::Y)];
-    let mut optics = Optics {
-        lens,
-        first_mirror: section.choice("first_mirror", &axes)?.unwrap_or(Axis::X),
-        field_mm: section.need("field_mm", 0.1..=1e4)?,
-        aperture_mm: section.number("aperture_mm", 0.1..=500.0)?,
-        focus: None,
-        plane_mm: 0.0,
-    };
+    let first_mirror = section.choice("first_mirror", &axes)?.unwrap_or(Axis::X);
+    let mut optics = Optics::new(lens, first_mirror, section.need("field_mm", 0.1..=1e4)?);
+    optics.aperture_mm = section.number("aperture_mm", 0.1..=500.0)?;
     let plane_mm = section.number("plane_mm", -1e5..=1e5)?.unwrap_or(0.0);
     optics = optics
         .at_height(plane_mm)

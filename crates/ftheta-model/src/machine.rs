@@ -123,16 +123,27 @@ pub struct Optics {
 }
 
 impl Optics {
+    /// Optics of this lens over the nominal work plane, with a fixed focus.
+    pub fn new(lens: Lens, first_mirror: Axis, field_mm: f64) -> Self {
+        Self { lens, first_mirror, field_mm, aperture_mm: None, focus: None, plane_mm: 0.0 }
+    }
+
+    /// Height above the nominal work plane that every other one stays below, mm: that of the second
+    /// mirror; infinite behind an F-theta lens.
+    pub fn height_limit_mm(&self) -> f64 {
+        match self.lens {
+            Lens::PostObjective { working_distance_mm, .. } => working_distance_mm,
+            Lens::FTheta { .. } => f64::INFINITY,
+        }
+    }
+
     /// The same over a work plane of another height; `None` where there is no room for it.
     ///
     /// Behind an F-theta lens the height moves the focus alone; what else it does is left to the
     /// planes of a correction table.
     pub fn at_height(&self, plane_mm: f64) -> Option<Self> {
-        let fits = match self.lens {
-            Lens::PostObjective { working_distance_mm, .. } => working_distance_mm > plane_mm,
-            Lens::FTheta { .. } => true,
-        };
-        (fits && plane_mm.is_finite()).then(|| Self { plane_mm, ..self.clone() })
+        let fits = plane_mm.is_finite() && plane_mm < self.height_limit_mm();
+        fits.then(|| Self { plane_mm, ..self.clone() })
     }
 }
 

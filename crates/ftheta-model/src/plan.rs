@@ -69,6 +69,24 @@ pub struct PlannedMark {
     pub steps: Vec<LaserEdge>,
 }
 
+impl PlannedMark {
+    /// First and last tick with its light, which follows the edges by the laser's latencies; two
+    /// ticks or more.
+    pub fn lit_ticks(&self, machine: &Machine) -> (u64, u64) {
+        let laser = &machine.laser;
+        let period_ns = i128::from(machine.output.period_ns);
+        let on_ns = i128::from(self.on_ns) + i128::from(laser.on_latency_ns);
+        let off_ns = i128::from(self.off_ns) + i128::from(laser.off_latency_ns);
+        // An edge is rounded to a nanosecond.
+        let (first, last) = ((on_ns - 1).div_euclid(period_ns) + 1, off_ns.div_euclid(period_ns));
+        let (first, last) = match last > first {
+            true => (first, last),
+            false => (on_ns.div_euclid(period_ns), last.max(on_ns.div_euclid(period_ns) + 1)),
+        };
+        (first.max(0) as u64, last.max(1) as u64)
+    }
+}
+
 /// Direction and arc length at a vertex of a curve.
 ///
 /// Between two of them the path is the cubic with these ends, directions and length: of an arc of

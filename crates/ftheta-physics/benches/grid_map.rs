@@ -20,14 +20,7 @@ fn main() {
 fn map(interpolation: Interpolation, n_nodes: usize) -> GridMap {
     let coefficients_mm = vec![420.456, -6.051, 37.397, -55.24];
     let lens = Lens::FTheta { coefficients_mm };
-    let optics = Optics {
-        lens,
-        first_mirror: Axis::X,
-        field_mm: 336.0,
-        aperture_mm: None,
-        focus: None,
-        plane_mm: 0.0,
-    };
+    let optics = Optics::new(lens, Axis::X, 336.0);
     let command = |x_mm, y_mm| {
         let angles = angles_from_field(&optics, FieldPoint::new(x_mm, y_mm))?;
         Some([angles.x_rad, angles.y_rad])

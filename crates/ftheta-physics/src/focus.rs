@@ -104,6 +104,12 @@ pub fn lens_travel_mm(optics: &Optics, place: FieldPoint) -> Option<f64> {
     Some(travel_of_shift_mm(optics, focus, shift_mm))
 }
 
+/// Greatest travel of the lens that a plan may ask for, mm: the beam may be off its mark by the
+/// tolerance, and so off the field.
+pub fn travel_max_mm(focus: &Focus, tolerance_mm: f64) -> f64 {
+    focus.travel_mm + tolerance_mm / focus.magnification.abs()
+}
+
 /// How [`lens_travel_mm`] changes with the place, mm per mm in x and y.
 pub fn lens_gradient(optics: &Optics, place: FieldPoint) -> Option<Vec2> {
     let focus = optics.focus.as_ref()?;

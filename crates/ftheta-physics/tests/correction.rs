@@ -16,14 +16,7 @@ const BOTH: [Interpolation; 2] = [Interpolation::Bilinear, Interpolation::Catmul
 
 fn optics() -> Optics {
     let lens = Lens::FTheta { coefficients_mm: F420.to_vec() };
-    Optics {
-        lens,
-        first_mirror: Axis::X,
-        field_mm: 336.0,
-        aperture_mm: None,
-        focus: None,
-        plane_mm: 0.0,
-    }
+    Optics::new(lens, Axis::X, 336.0)
 }
 
 /// Place to command of the f = 420 mm lens, in mm of the linear command, as in the reference.

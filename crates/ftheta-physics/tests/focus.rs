@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 fn post(e_mm: f64, d_mm: f64, field_mm: f64, first_mirror: Axis) -> Optics {
     let lens = Lens::PostObjective { mirror_distance_mm: e_mm, working_distance_mm: d_mm };
-    Optics { lens, first_mirror, field_mm, aperture_mm: None, focus: None, plane_mm: 0.0 }
+    Optics::new(lens, first_mirror, field_mm)
 }
 
 fn lens() -> Focus {

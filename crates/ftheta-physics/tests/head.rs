@@ -96,14 +96,7 @@ proptest! {
         let angles = MirrorAngles::new(x_rad, y_rad);
         let coefficients_mm = vec![420.456, -6.051, 37.397, -55.24];
         let lens = Lens::FTheta { coefficients_mm: coefficients_mm.clone() };
-        let optics = Optics {
-            lens,
-            first_mirror: Axis::X,
-            field_mm: 300.0,
-            aperture_mm: None,
-            focus: None,
-            plane_mm: 0.0,
-        };
+        let optics = Optics::new(lens, Axis::X, 300.0);
         let lens = HeadLens::perfect(coefficients_mm);
         let tracer = Tracer::new(&Head::perfect(30.0, 500.0, Some(lens)));
         let (exact, traced) = (field_from_angles(&optics, angles), tracer.place(angles));

@@ -25,28 +25,14 @@ fn rows(value: &Value) -> Vec<Vec<f64>> {
 }
 
 fn lens(coefficients_mm: Vec<f64>, field_mm: f64) -> Optics {
-    Optics {
-        lens: Lens::FTheta { coefficients_mm },
-        first_mirror: Axis::X,
-        field_mm,
-        aperture_mm: None,
-        focus: None,
-        plane_mm: 0.0,
-    }
+    Optics::new(Lens::FTheta { coefficients_mm }, Axis::X, field_mm)
 }
 
 fn post(case: &Value) -> Optics {
     let number = |key: &str| case[key].as_f64().unwrap();
     let lens =
         Lens::PostObjective { mirror_distance_mm: number("e"), working_distance_mm: number("d") };
-    Optics {
-        lens,
-        first_mirror: Axis::X,
-        field_mm: 300.0,
-        aperture_mm: None,
-        focus: None,
-        plane_mm: 0.0,
-    }
+    Optics::new(lens, Axis::X, 300.0)
 }
 
 /// Forward to 1e-9 mm and back to 1e-12 rad over all rows of a case.
@@ -157,14 +143,7 @@ fn inverse_table(optics: &Optics) -> MapTable {
 #[test]
 fn inverse_table_is_within_a_nanometre() {
     let post = Lens::PostObjective { mirror_distance_mm: 12.0, working_distance_mm: 180.0 };
-    let post = Optics {
-        lens: post,
-        first_mirror: Axis::Y,
-        field_mm: 110.0,
-        aperture_mm: None,
-        focus: None,
-        plane_mm: 0.0,
-    };
+    let post = Optics::new(post, Axis::Y, 110.0);
     let ideal = lens(vec![160.0], 120.0);
     let all =
         [lens(F163.into(), 121.0), lens(F255.into(), 202.0), lens(F420.into(), 336.0), ideal, post];

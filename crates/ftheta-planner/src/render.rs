@@ -2,6 +2,7 @@
 
 mod axes;
 mod lens;
+mod mirrors;
 mod pulses;
 pub(crate) mod track;
 mod words;
@@ -15,6 +16,7 @@ use ftheta_physics::correction::CorrectionTable;
 use ftheta_physics::plan::Plan;
 use kurbo::{Point, Vec2};
 use lens::LensPath;
+pub use mirrors::PlayedMirrors;
 use pulses::Triggers;
 use track::Track;
 use words::Words;

@@ -129,17 +129,7 @@ mod tests {
     #[test]
     fn heads_are_the_references() {
         let lens = Lens::FTheta { coefficients_mm: vec![420.456, -6.051, 37.397, -55.240] };
-        let head = hidden_head(
-            &Optics {
-                lens,
-                first_mirror: Axis::X,
-                field_mm: 336.0,
-                aperture_mm: None,
-                focus: None,
-                plane_mm: 0.0,
-            },
-            7,
-        );
+        let head = hidden_head(&Optics::new(lens, Axis::X, 336.0), 7);
         let near = |found: f64, expected: f64| {
             let error = (found - expected).abs();
             assert!(error < 1e-7 * expected.abs().max(1e-3), "{found} instead of {expected}");

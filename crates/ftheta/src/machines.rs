@@ -2,7 +2,7 @@
 
 use crate::{Error, import};
 use ftheta_formats::machine;
-use ftheta_model::machine::{Lens, Machine};
+use ftheta_model::machine::Machine;
 use std::path::Path;
 
 /// The machine of this name: a preset, or else a machine file.
@@ -19,10 +19,7 @@ pub fn find(name: &str) -> Result<Machine, Error> {
 /// # Errors
 /// If the head is not above it.
 pub fn at_height(machine: Machine, z_mm: f64) -> Result<Machine, Error> {
-    let limit_mm = match machine.optics.lens {
-        Lens::PostObjective { working_distance_mm, .. } => working_distance_mm,
-        Lens::FTheta { .. } => f64::INFINITY,
-    };
+    let limit_mm = machine.optics.height_limit_mm();
     let optics = machine.optics.at_height(z_mm).ok_or(Error::NoRoom { z_mm, limit_mm })?;
     Ok(Machine { optics, ..machine })
 }

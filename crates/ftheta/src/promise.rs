@@ -1,16 +1,13 @@
 //! What contour error a plan promises on motors that the machine file is not certain of.
 
 use crate::Error;
-use ftheta_model::block::Block;
-use ftheta_model::space::MirrorAngles;
 use ftheta_physics::along::Along;
-use ftheta_physics::axis_loop::AxisLoop;
-use ftheta_physics::galvo::{Galvo, State};
+use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::field_from_angles;
 use ftheta_physics::plan::Plan;
 use ftheta_physics::servo::Gains;
 use ftheta_planner::optimal::near_scanner;
-use ftheta_planner::render::Renderer;
+use ftheta_planner::render::PlayedMirrors;
 use std::panic::resume_unwind;
 use std::thread::{self, ScopedJoinHandle};
 
@@ -68,29 +65,14 @@ pub fn promise(plan: &Plan) -> Result<Option<Promise>, Error> {
 /// Greatest distance of the lit beam from its marks on a motor, mm.
 fn worst_mm(plan: &Plan, plant: &Galvo, gains: Gains) -> f64 {
     let machine = &plan.machine;
-    let axis = AxisLoop::new(plant, gains, &machine.scanner, machine.output.period_s());
-    let mut axes = [axis.clone(), axis];
-    let row: State = plant.mirror_row();
-    let rad_per_word = machine.output.word_step_rad();
-    let period_ns = i64::from(machine.output.period_ns);
-    let mut renderer = Renderer::new(plan);
-    let mut block = Block::default();
+    let mut mirrors = PlayedMirrors::new(plan, plant, gains);
     let mut lit = LitMark { plan, mark: 0, along: None };
     let mut worst_mm = 0.0_f64;
-    while renderer.next_block(&mut block) {
-        for (index, word) in block.words.iter().enumerate() {
-            for (axis, word) in [word.x, word.y].into_iter().enumerate() {
-                match block.volts.get(index) {
-                    Some(planned) => axes[axis].tick_beside(&planned[axis], 0.0),
-                    None => axes[axis].tick(f64::from(word) * rad_per_word, 0.0),
-                };
-            }
-            let end_ns = (block.first_index as i64 + index as i64 + 1) * period_ns;
-            if let Some(along) = lit.at(end_ns) {
-                let [x_rad, y_rad] = [0, 1].map(|axis| row.dot(axes[axis].state()));
-                let place = field_from_angles(&machine.optics, MirrorAngles { x_rad, y_rad });
-                worst_mm = worst_mm.max(along.distance_mm(place.into()));
-            }
+    while mirrors.advance() {
+        let end_ns = mirrors.tick() as i64 * i64::from(machine.output.period_ns);
+        if let Some(along) = lit.at(end_ns) {
+            let place = field_from_angles(&machine.optics, mirrors.angles());
+            worst_mm = worst_mm.max(along.distance_mm(place.into()));
         }
     }
     worst_mm

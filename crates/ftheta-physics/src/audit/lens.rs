@@ -2,7 +2,7 @@
 //! the work plane; in the dark it may take any path that its limits allow.
 
 use super::{AuditError, ROUNDING, six_digits};
-use crate::focus::lens_travel_mm;
+use crate::focus::{lens_travel_mm, travel_max_mm};
 use crate::optics::field_from_angles;
 use ftheta_model::machine::Focus;
 use ftheta_model::plan::PlanDraft;
@@ -79,23 +79,18 @@ impl<'a> LensWalk<'a> {
         };
         let time_s = n_ticks as f64 * self.tick_s;
         let end = Moving { time_s, at_mm, speed_mm_s: 0.0 };
-        check_dark(focus, self.travel_max_mm(focus), [self.left, end], "end of the plan")
+        check_dark(
+            focus,
+            travel_max_mm(focus, self.draft.tolerance_mm),
+            [self.left, end],
+            "end of the plan",
+        )
     }
 
-    /// First and last tick of the light of the mark at hand; two ticks or more.
+    /// First and last tick of the light of the mark at hand.
     fn bound(&self) -> Option<(u64, u64)> {
         let mark = self.draft.marks.get(self.mark_index)?;
-        let laser = &self.draft.machine.laser;
-        let period_ns = i128::from(self.draft.machine.output.period_ns);
-        let on_ns = i128::from(mark.on_ns) + i128::from(laser.on_latency_ns);
-        let off_ns = i128::from(mark.off_ns) + i128::from(laser.off_latency_ns);
-        // An edge is rounded to a nanosecond.
-        let (first, last) = ((on_ns - 1).div_euclid(period_ns) + 1, off_ns.div_euclid(period_ns));
-        let (first, last) = match last > first {
-            true => (first, last),
-            false => (on_ns.div_euclid(period_ns), last.max(on_ns.div_euclid(period_ns) + 1)),
-        };
-        Some((first.max(0) as u64, last.max(1) as u64))
+        Some(mark.lit_ticks(&self.draft.machine))
     }
 
     fn lit(&mut self, focus: &Focus, tick: u64, angles: MirrorAngles) -> Result<(), AuditError> {
@@ -107,8 +102,7 @@ impl<'a> LensWalk<'a> {
             let time_ms = tick as f64 * self.tick_s * 1e3;
             format!("mark {} ({}) at {time_ms:.3} ms", self.mark_index, mark.source)
         };
-        // The beam may be off its mark by the tolerance, and so off the field.
-        let travel_max_mm = self.travel_max_mm(focus);
+        let travel_max_mm = travel_max_mm(focus, self.draft.tolerance_mm);
         within(&place, "travel of the focusing lens", at_mm, travel_max_mm, "mm")?;
         if self.n_before > 0 {
             let speed_mm_s = (at_mm - last_mm) / self.tick_s;
@@ -130,10 +124,6 @@ impl<'a> LensWalk<'a> {
         self.before_mm = [at_mm, last_mm];
         self.n_before = (self.n_before + 1).min(2);
         Ok(())
-    }
-
-    fn travel_max_mm(&self, focus: &Focus) -> f64 {
-        focus.travel_mm + self.draft.tolerance_mm / focus.magnification.abs()
     }
 }
 

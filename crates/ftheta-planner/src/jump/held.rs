@@ -54,14 +54,20 @@ impl Held {
             (kt, torque(kt), None),
         ];
         let plants = borders.into_iter().filter(|(uncertainty, ..)| *uncertainty > 0.0);
-        let held = |plant: &Galvo, share| Self {
-            share,
-            ..Self::new(&nominal, plant, k.as_slice(), tick_s, lag_ticks)
+        let held = |(_, plant, share): (f64, Galvo, Option<f64>)| {
+            Self::new(&nominal, &plant, share, k.as_slice(), tick_s, lag_ticks)
         };
-        Ok(plants.map(|(_, plant, share)| held(&plant, share)).collect())
+        Ok(plants.map(held).collect())
     }
 
-    fn new(nominal: &Galvo, plant: &Galvo, k: &[f64], tick_s: f64, lag_ticks: f64) -> Self {
+    fn new(
+        nominal: &Galvo,
+        plant: &Galvo,
+        share: Option<f64>,
+        k: &[f64],
+        tick_s: f64,
+        lag_ticks: f64,
+    ) -> Self {
         let (Step { a, b }, one) = (nominal.step(tick_s), plant.step(tick_s));
         let mut motion = SMatrix::<f64, N_DEVIATIONS, N_DEVIATIONS>::zeros();
         let mut from_state = SMatrix::<f64, N_DEVIATIONS, 5>::zeros();
@@ -90,7 +96,7 @@ impl Held {
             }
             looks.push(weights);
         }
-        Self { motion, from_state, from_voltage, share: None, looks }
+        Self { motion, from_state, from_voltage, share, looks }
     }
 
     /// How a difference at the end depends on the nominal states and the voltage of each tick.

@@ -8,7 +8,7 @@ use crate::PlanError;
 use ftheta_model::machine::{Focus, Lens, Machine, Optics};
 use ftheta_model::space::MirrorAngles;
 use ftheta_model::toolpath::Mark;
-use ftheta_physics::focus::{lens_gradient, lens_travel_mm};
+use ftheta_physics::focus::{lens_gradient, lens_travel_mm, travel_max_mm};
 use ftheta_physics::follow::TAPS_BEFORE;
 use ftheta_physics::galvo::{Galvo, State};
 use ftheta_physics::optics::field_from_angles;
@@ -84,12 +84,12 @@ impl<'a> LensAxis<'a> {
     /// Checks that the lens can put the focus on the places of all marks and on the centre, where
     /// the mirrors wait.
     ///
-    /// * `slack_mm`: by which the beam may be off a place
+    /// * `tolerance_mm`: by which the beam may be off a place
     ///
     /// # Errors
     /// The first place that it cannot.
-    pub(super) fn check(&self, marks: &[Mark], slack_mm: f64) -> Result<(), PlanError> {
-        let most_mm = self.focus.travel_mm + slack_mm / self.focus.magnification.abs();
+    pub(super) fn check(&self, marks: &[Mark], tolerance_mm: f64) -> Result<(), PlanError> {
+        let most_mm = travel_max_mm(self.focus, tolerance_mm);
         let check = |place: &dyn Fn() -> String, at: Point| {
             let travel_mm = self.travel_mm(at);
             if travel_mm.abs() <= most_mm {

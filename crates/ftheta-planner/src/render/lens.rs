@@ -2,12 +2,10 @@
 //! in the dark it takes the gentlest way to where the next light begins.
 
 use super::Renderer;
-use ftheta_model::block::Block;
+use super::mirrors::PlayedMirrors;
 use ftheta_model::machine::Focus;
-use ftheta_model::space::MirrorAngles;
-use ftheta_physics::axis_loop::AxisLoop;
-use ftheta_physics::focus::lens_travel_mm;
-use ftheta_physics::galvo::{Galvo, State};
+use ftheta_physics::focus::{lens_travel_mm, travel_max_mm};
+use ftheta_physics::galvo::Galvo;
 use ftheta_physics::optics::field_from_angles;
 use ftheta_physics::plan::Plan;
 use ftheta_physics::servo::Gains;
@@ -66,8 +64,7 @@ impl<'a> LensPath<'a> {
         Some(Self {
             lit: LitTicks::new(plan, ahead),
             focus,
-            // The beam may be off its mark by the tolerance, and so off the field.
-            travel_max_mm: focus.travel_mm + plan.tolerance_mm / focus.magnification.abs(),
+            travel_max_mm: travel_max_mm(focus, plan.tolerance_mm),
             tick_s,
             end: rest(plan.n_samples() as f64 * tick_s),
             before: None,
@@ -215,68 +212,17 @@ impl Way {
 #[derive(Clone)]
 struct LitTicks<'a> {
     plan: &'a Plan,
-    ahead: Box<Renderer<'a>>,
-    axes: [AxisLoop; 2],
-    mirror_row: State,
-    rad_per_word: f64,
-    block: Block,
-    n_used: usize,
-    tick: u64,
+    mirrors: Box<PlayedMirrors<'a>>,
     mark_index: usize,
 }
 
 impl<'a> LitTicks<'a> {
     fn new(plan: &'a Plan, ahead: Renderer<'a>) -> Self {
-        let (machine, tick_s) = (&plan.machine, plan.machine.output.period_s());
-        let galvo = Galvo::new(&machine.scanner);
-        let gains = Gains::design(&machine.scanner, tick_s).expect("the audit has designed it");
-        let axis = AxisLoop::new(&galvo, gains, &machine.scanner, tick_s);
-        Self {
-            plan,
-            ahead: Box::new(ahead),
-            axes: [axis.clone(), axis],
-            mirror_row: galvo.mirror_row(),
-            rad_per_word: machine.output.word_step_rad(),
-            block: Block::default(),
-            n_used: 0,
-            tick: 0,
-            mark_index: 0,
-        }
-    }
-
-    /// First and last tick of the light of the mark at hand; two ticks or more.
-    fn bound(&self) -> Option<(u64, u64)> {
-        let mark = self.plan.marks.get(self.mark_index)?;
-        let (laser, output) = (&self.plan.machine.laser, &self.plan.machine.output);
-        let period_ns = i64::from(output.period_ns);
-        let on_ns = (mark.on_ns as i64 + laser.on_latency_ns).max(0);
-        let off_ns = (mark.off_ns as i64 + laser.off_latency_ns).max(0);
-        // An edge is rounded to a nanosecond.
-        let (first, last) = ((on_ns - 1).div_euclid(period_ns) + 1, off_ns / period_ns);
-        Some(match last > first {
-            true => (first as u64, last as u64),
-            false => ((on_ns / period_ns) as u64, last.max(on_ns / period_ns + 1) as u64),
-        })
-    }
-
-    /// Plays the next sample on the nominal motors; `false` after the last one.
-    fn play(&mut self) -> bool {
-        if self.n_used == self.block.words.len() {
-            self.n_used = 0;
-            if !self.ahead.next_block(&mut self.block) {
-                return false;
-            }
-        }
-        let word = self.block.words[self.n_used];
-        for (axis, word) in [word.x, word.y].into_iter().enumerate() {
-            match self.block.volts.get(self.n_used) {
-                Some(planned) => self.axes[axis].tick_beside(&planned[axis], 0.0),
-                None => self.axes[axis].tick(f64::from(word) * self.rad_per_word, 0.0),
-            };
-        }
-        self.n_used += 1;
-        self.tick += 1;
-        true
+        let scanner = &plan.machine.scanner;
+        let gains = Gains::design(scanner, plan.machine.output.period_s());
+        let gains = gains.expect("the audit has designed it");
+        let mirrors = PlayedMirrors::of(ahead, &Galvo::new(scanner), gains);
+        Self { plan, mirrors: Box::new(mirrors), mark_index: 0 }
     }
 }
 
@@ -284,16 +230,15 @@ impl Iterator for LitTicks<'_> {
     type Item = (u64, f64);
 
     fn next(&mut self) -> Option<(u64, f64)> {
-        while self.play() {
-            while self.bound().is_some_and(|(_, last)| last < self.tick) {
-                self.mark_index += 1;
-            }
-            if self.bound()?.0 <= self.tick {
-                let optics = &self.plan.machine.optics;
-                let [x_rad, y_rad] =
-                    [0, 1].map(|axis| self.mirror_row.dot(self.axes[axis].state()));
-                let place = field_from_angles(optics, MirrorAngles { x_rad, y_rad });
-                return Some((self.tick, lens_travel_mm(optics, place)?));
+        let machine = &self.plan.machine;
+        while self.mirrors.advance() {
+            let tick = self.mirrors.tick();
+            let mut lit = self.plan.marks[self.mark_index..].iter().map(|m| m.lit_ticks(machine));
+            let n_past = lit.position(|(_, last)| tick <= last)?;
+            self.mark_index += n_past;
+            if self.plan.marks[self.mark_index].lit_ticks(machine).0 <= tick {
+                let place = field_from_angles(&machine.optics, self.mirrors.angles());
+                return Some((tick, lens_travel_mm(&machine.optics, place)?));
             }
         }
         None

@@ -28,14 +28,7 @@ pub fn machine() -> Machine {
             servo: Servo::StateFeedback { velocity_weight_s: 7e-5, lag_s: 1.6e-4 },
             sensor: Sensor::default(),
         },
-        optics: Optics {
-            lens: Lens::FTheta { coefficients_mm: vec![160.0] },
-            first_mirror: Axis::Y,
-            field_mm: 120.0,
-            aperture_mm: None,
-            focus: None,
-            plane_mm: 0.0,
-        },
+        optics: Optics::new(Lens::FTheta { coefficients_mm: vec![160.0] }, Axis::Y, 120.0),
         laser: Laser {
             wavelength_nm: 1064.0,
             beam_quality_m2: 1.1,

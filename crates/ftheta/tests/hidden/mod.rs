@@ -52,14 +52,7 @@ impl Setup {
     /// What the machine file says.
     pub fn optics(&self) -> Optics {
         let coefficients_mm = if self.polynomial { F420.to_vec() } else { vec![F420[0]] };
-        Optics {
-            lens: Lens::FTheta { coefficients_mm },
-            first_mirror: Axis::X,
-            field_mm: 336.0,
-            aperture_mm: None,
-            focus: None,
-            plane_mm: 0.0,
-        }
+        Optics::new(Lens::FTheta { coefficients_mm }, Axis::X, 336.0)
     }
 
     pub fn head(&self, seed: u64) -> Head {
